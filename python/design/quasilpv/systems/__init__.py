@@ -1,0 +1,1 @@
+"""Systems: descriptor models affine in premises, and the robots they come from."""
