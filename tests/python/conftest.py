@@ -1,0 +1,11 @@
+"""Settings every Python test shares."""
+
+import matplotlib
+from hypothesis import settings
+
+# No display is needed, and a slow machine is no failure. The quick tier draws the same examples every time;
+# ./tools/test --full draws fresh ones, and more.
+matplotlib.use("Agg")
+settings.register_profile("quick", deadline=None, derandomize=True)
+settings.register_profile("full", deadline=None, max_examples=1000, print_blob=True)
+settings.load_profile("quick")

@@ -1,0 +1,180 @@
+"""The order of the layers and the hygiene of the tree, read from the sources."""
+
+import ast
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "python" / "design" / "quasilpv"
+
+# Every room of the package, lowest layer first. A room imports itself and the layers below its own.
+LAYERS = (
+    {"", "errors"},
+    {"systems"},
+    {"polytopes"},
+    {"lmi"},
+    {"conditions"},
+    {"synthesis"},
+    {"certificate"},
+    {"artifact"},
+    {"trajectories", "scenarios", "_runtime"},
+    {"experiments"},
+    {"figures"},
+    {"cli"},
+)
+RANK = {room: rank for rank, layer in enumerate(LAYERS) for room in layer}
+
+# What a room must not load even through others, although the order would allow it.
+SEPARATE = {
+    "certificate": {"quasilpv.lmi", "quasilpv.conditions", "cvxpy", "clarabel"},
+    "artifact": {"quasilpv.lmi", "quasilpv.conditions", "quasilpv.synthesis", "cvxpy", "clarabel"},
+}
+
+
+def module_name(path: Path) -> str:
+    """Dotted name of a source file of the package."""
+    parts = ("quasilpv", *path.relative_to(PACKAGE).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+SOURCES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def room_of(module: str) -> str:
+    """Top-level room of a module of the package; "" is the package root."""
+    return [*module.split("."), ""][1]
+
+
+def imported_by(module: str, source: str, is_package: bool) -> Iterator[str]:
+    """Absolute names of everything a module imports anywhere in its text; `from a import b` gives a and a.b."""
+    package = module if is_package else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parents = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            base = ".".join([*parents, *([node.module] if node.module else [])])
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+IMPORTS = {
+    name: set(imported_by(name, path.read_text(encoding="utf-8"), path.name == "__init__.py"))
+    for name, path in SOURCES.items()
+}
+
+
+def loaded_with(module: str) -> set[str]:
+    """Everything that importing a module imports, through modules of the package."""
+    seen: set[str] = set()
+    pending = [module]
+    while pending:
+        new = IMPORTS.get(pending.pop(), set()) - seen
+        seen |= new
+        pending += new
+    return seen
+
+
+def upward_imports(module: str, imports: set[str]) -> set[str]:
+    """Imports of rooms of another name in the same or a higher layer."""
+    own = room_of(module)
+    # `from quasilpv import __version__` names no room.
+    rooms = {name: room_of(name) for name in imports if name.startswith("quasilpv.") and room_of(name) in RANK}
+    return {name for name, room in rooms.items() if room != own and RANK[room] >= RANK[own]}
+
+
+def test_every_room_has_a_place_in_the_order() -> None:
+    assert SOURCES
+    assert {room_of(module) for module in SOURCES} <= set(RANK)
+
+
+@pytest.mark.parametrize("module", SOURCES)
+def test_no_module_imports_a_higher_layer(module: str) -> None:
+    assert upward_imports(module, IMPORTS[module]) == set()
+
+
+@pytest.mark.parametrize("module", [name for name in SOURCES if room_of(name) in SEPARATE])
+def test_separate_rooms_stay_independent_of_what_they_check(module: str) -> None:
+    forbidden = SEPARATE[room_of(module)]
+    loaded = loaded_with(module)
+    assert {name for name in loaded if any(name == f or name.startswith(f + ".") for f in forbidden)} == set()
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import quasilpv.cli",
+        "from quasilpv import cli",
+        "from quasilpv.cli import main",
+        "from ..cli import main",
+        "from .. import cli",
+        "def late():\n    from quasilpv.cli import main",
+    ],
+)
+def test_when_a_system_imports_the_command_line_in_any_spelling_expect_it_found(source: str) -> None:
+    imports = set(imported_by("quasilpv.systems.arm", source, is_package=False))
+    assert "quasilpv.cli" in upward_imports("quasilpv.systems.arm", imports)
+
+
+def tracked_files(*patterns: str) -> list[Path]:
+    """Files under version control, and new ones that are not ignored, that still exist."""
+    command = ["git", "-c", f"safe.directory={ROOT}", "ls-files", "--cached", "--others", "--exclude-standard"]
+    listing = subprocess.run([*command, "--", *patterns], cwd=ROOT, check=True, capture_output=True, text=True)
+    return [path for line in sorted(set(listing.stdout.splitlines())) if (path := ROOT / line).is_file()]
+
+
+def included_headers(path: Path) -> list[str]:
+    """Header names of the include directives of a C++ file."""
+    return re.findall(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+
+
+def test_the_controller_never_includes_the_simulator() -> None:
+    simulator = {str(header.relative_to(ROOT / "cpp/sim/include")) for header in tracked_files("cpp/sim/include/*.hpp")}
+    simulator |= {header.name for header in tracked_files("cpp/sim/**.hpp")}
+    files = tracked_files("cpp/controller/*.hpp", "cpp/controller/*.cpp")
+    assert files
+    assert [(file, name) for file in files for name in included_headers(file) if name in simulator] == []
+
+
+def test_only_the_ida_integrator_includes_sundials() -> None:
+    prefixes = ("ida/", "idas/", "nvector/", "sunmatrix/", "sunlinsol/", "sunnonlinsol/", "sundials/")
+    users = {
+        file.name
+        for file in tracked_files("*.hpp", "*.cpp")
+        for name in included_headers(file)
+        if name.startswith(prefixes)
+    }
+    assert users == {"ida_integrator.cpp"}
+
+
+def test_no_build_file_relaxes_floating_point() -> None:
+    flags = re.compile(r"-ffast-math|-Ofast|-funsafe-math|-ffinite-math|-fassociative-math")
+    files = tracked_files("*CMakeLists.txt", "*.cmake", "CMakePresets.json", "pyproject.toml", "tools/lib/*")
+    assert files
+    # Comments may name the flags to say why they are not used.
+    settings = {file: re.sub(r"#.*", "", file.read_text(encoding="utf-8")) for file in files}
+    assert [file for file, text in settings.items() if flags.search(text)] == []
+
+
+@pytest.mark.parametrize(
+    ("what", "pattern"),
+    [
+        # Written so that they do not match themselves.
+        ("path of a machine", r"(?<![\w.])/(?:work|root|home/\w+|Users/\w+)/"),
+        ("unfinished place", r"\b(?:TO[D]O|FIX[M]E|NotImplemented[E]rror)\b"),
+        ("unresolved merge", r"^(?:<{7}|>{7}) "),
+    ],
+)
+def test_no_file_holds_what_does_not_belong_in_the_project(what: str, pattern: str) -> None:
+    expression = re.compile(pattern, flags=re.MULTILINE)
+    texts = {}
+    for file in tracked_files():
+        content = file.read_bytes()
+        if b"\0" not in content:
+            texts[file] = content.decode("utf-8")
+    assert texts
+    assert [f"{file.relative_to(ROOT)}: {what}" for file, text in texts.items() if expression.search(text)] == []
