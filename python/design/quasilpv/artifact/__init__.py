@@ -1,0 +1,17 @@
+"""Artifacts: the controller as one canonical, hashed document that the run-time side loads."""
+
+from quasilpv.artifact.programs import Program, compile_program, evaluate
+from quasilpv.artifact.schema import Artifact
+from quasilpv.artifact.store import Difference, diff, read_artifact, summary, write_artifact
+
+__all__ = [
+    "Artifact",
+    "Difference",
+    "Program",
+    "compile_program",
+    "diff",
+    "evaluate",
+    "read_artifact",
+    "summary",
+    "write_artifact",
+]

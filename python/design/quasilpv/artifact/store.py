@@ -1,0 +1,120 @@
+"""Artifacts on disk: both twins written together, either twin read back; comparison and summary for people."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from quasilpv.artifact.canonical import canonical_cbor, canonical_json, member_path, parse_document, read_bytes
+from quasilpv.artifact.schema import Artifact
+from quasilpv.errors import InputError
+
+JSON_NAME = "artifact.json"
+CBOR_NAME = "artifact.cbor"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One field in which two documents differ; ``None`` stands for a missing member (and for null)."""
+
+    path: str
+    left: Any
+    right: Any
+
+
+def write_artifact(directory: Path | str, artifact: Artifact) -> tuple[Path, Path]:
+    """Write ``artifact.json`` and ``artifact.cbor`` into ``directory``, which is created if needed.
+
+    Returns:
+        The paths of the JSON and the CBOR twin.
+
+    Raises:
+        InputError: the directory cannot be written; nothing half-written is left behind.
+    """
+    directory = Path(directory)
+    document = artifact.to_document()
+    paths = directory / JSON_NAME, directory / CBOR_NAME
+    write_atomically({paths[0]: canonical_json(document), paths[1]: canonical_cbor(document)})
+    return paths
+
+
+def read_artifact(path: Path | str) -> Artifact:
+    """Read either twin of an artifact.
+
+    Raises:
+        InputError: the file is missing, damaged, not canonical, or not a valid artifact.
+    """
+    source = str(path)
+    return Artifact.from_document(parse_document(read_bytes(path), source), source)
+
+
+def write_atomically(contents: Mapping[Path, bytes]) -> None:
+    """Write files so that each has its old or its new content, never a part: temporary files first, then renames.
+
+    Raises:
+        InputError: a file cannot be written; the temporary files are removed.
+    """
+    temporary: dict[Path, Path] = {}
+    target = next(iter(contents))
+    try:
+        for target, data in contents.items():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}-", delete=False) as file:
+                temporary[target] = Path(file.name)
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary[target].chmod(0o644)
+        for target, path in temporary.items():
+            path.replace(target)
+    except OSError as error:
+        raise InputError(str(target), "file", error.strerror or error, "a writable file") from error
+    finally:
+        for path in temporary.values():
+            path.unlink(missing_ok=True)
+
+
+def diff(left: Artifact, right: Artifact) -> list[Difference]:
+    """Return the fields in which two artifacts differ, in the order of their paths; empty if they are equal."""
+    return list(_differences(left.content(), right.content(), ""))
+
+
+def summary(artifact: Artifact) -> dict[str, Any]:
+    """Return what ``design inspect`` prints: identity, sizes, law and the results of checks, as a JSON-able tree."""
+    law = artifact.law
+    inertia = law.inertia
+    tables = {"kind", "inertia"}
+    return {
+        "name": artifact.name,
+        "hash": artifact.hash,
+        "design_hash": artifact.design_hash,
+        "creator": f"{artifact.creator.tool} {artifact.creator.version}",
+        "robot": artifact.robot.id,
+        "joints": artifact.joints,
+        "sample_period_s": artifact.sample_period_s,
+        "law": law.kind,
+        "gains": {key: value for key, value in law.model_dump(mode="json").items() if key not in tables},
+        "premises": inertia.premises,
+        "blocks": [len(block.premises) for block in inertia.blocks],
+        "vertices": sum(len(block.vertices) for block in inertia.blocks),
+        "programs": {name: len(program.code) for name, program in sorted(artifact.programs.items())},
+        "torque_limit_nm": list(artifact.limits.torque_nm),
+        "slew_limit_nm_per_s": list(artifact.limits.slew_nm_per_s),
+        "witness": artifact.witness is not None,
+        "verification": artifact.verification,
+    }
+
+
+def _differences(left: Any, right: Any, path: str) -> Iterator[Difference]:
+    if isinstance(left, dict) and isinstance(right, dict):
+        for key in sorted(left.keys() | right.keys()):
+            yield from _differences(left.get(key), right.get(key), member_path(path, key))
+    elif isinstance(left, list) and isinstance(right, list) and len(left) == len(right):
+        for i, (a, b) in enumerate(zip(left, right, strict=True)):
+            yield from _differences(a, b, f"{path}[{i}]")
+    elif left != right:
+        yield Difference(path, left, right)
