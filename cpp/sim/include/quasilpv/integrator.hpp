@@ -1,0 +1,42 @@
+// Numerical integration of a plant between two torque jumps.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <variant>
+
+#include "quasilpv/plant.hpp"
+
+namespace quasilpv {
+
+/// Advances the state of one plant over intervals on which its control torque is constant.
+class Integrator {
+ public:
+  Integrator() = default;
+  virtual ~Integrator() = default;
+  Integrator(const Integrator&) = delete;
+  Integrator& operator=(const Integrator&) = delete;
+
+  /// Replaces `y`, the state at `from_s`, by the state at `to_s` > `from_s`, starting afresh: nothing is remembered
+  /// from the interval before. RT-UNSAFE. Throws PlantError; `y` is then unchanged.
+  virtual void advance(double from_s, double to_s, Eigen::VectorXd& y) = 0;
+};
+
+/// Variable-order, variable-step BDF (SUNDIALS IDA) on the implicit form.
+struct IdaOptions {
+  double relative_tolerance = 1e-8;
+  double absolute_tolerance = 1e-10;  ///< see Plant::absolute_tolerance
+};
+
+/// The classical fourth-order Runge-Kutta method with constant steps on the explicit form.
+struct Rk4Options {
+  int steps_per_sample = 1;
+};
+
+using IntegratorOptions = std::variant<IdaOptions, Rk4Options>;
+
+/// The integrator a scenario asks for. `plant` must outlive it. INIT-ONLY. Throws PlantError.
+std::unique_ptr<Integrator> make_integrator(const IntegratorOptions& options, const Plant& plant,
+                                            double sample_period_s);
+
+}  // namespace quasilpv

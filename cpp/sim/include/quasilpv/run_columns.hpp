@@ -1,0 +1,44 @@
+// The columns of a run: what the plant did and what the controller did. Shared by the in-process loop and both
+// programs, so that equal runs give equal files.
+#pragma once
+
+#include <cstddef>
+
+#include "quasilpv/plant_sample.hpp"
+#include "quasilpv/record.hpp"
+#include "quasilpv/step.hpp"
+
+namespace quasilpv {
+
+/// Columns of the plant: `angle_rad`, `speed_rad_s`, `acceleration_rad_s2`, `external_torque_nm`.
+class PlantColumns {
+ public:
+  /// INIT-ONLY. `record` must outlive this. Throws InputError if a column exists already.
+  PlantColumns(Record& record, int joints);
+  void append(const PlantSample& sample);
+
+ private:
+  Record& record_;
+  std::size_t angle_, speed_, acceleration_, external_torque_;
+};
+
+/// Columns of the controller: `measured_angle_rad`, `measured_speed_rad_s`, `reference_angle_rad`,
+/// `reference_speed_rad_s`, `reference_acceleration_rad_s2`, `torque_commanded_nm`, `torque_applied_nm`,
+/// `estimated_angle_rad`, `estimated_speed_rad_s`, `estimated_disturbance`, `filtered_disturbance` (rad/s^2 or N m, as
+/// the law says), `integral_error_rad_s` and `flags` (StepFlag bits).
+class StepColumns {
+ public:
+  /// INIT-ONLY. `record` must outlive this. Throws InputError if a column exists already.
+  StepColumns(Record& record, int joints);
+  void append(const StepInput& input, const StepReport& report);
+
+ private:
+  Record& record_;
+  std::size_t measured_angle_, measured_speed_;
+  std::size_t reference_angle_, reference_speed_, reference_acceleration_;
+  std::size_t torque_commanded_, torque_applied_;
+  std::size_t estimated_angle_, estimated_speed_, estimated_disturbance_, filtered_disturbance_;
+  std::size_t integral_error_, flags_;
+};
+
+}  // namespace quasilpv

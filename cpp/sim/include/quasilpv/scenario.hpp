@@ -1,0 +1,44 @@
+// The experiment: true plant, integrator, disturbance, sensors, delay, initial state. Format: docs/reference/formats.md
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "quasilpv/external_torque.hpp"
+#include "quasilpv/integrator.hpp"
+#include "quasilpv/plant.hpp"
+#include "quasilpv/sensors.hpp"
+#include "quasilpv/serial_arm.hpp"
+#include "quasilpv/step.hpp"
+
+namespace quasilpv {
+
+/// One alternative per plant kind of the scenario format.
+using PlantParameters = std::variant<SerialArmParameters>;
+
+/// A scenario document, validated.
+struct Scenario {
+  std::string name;
+  double duration_s = 0.0;
+  PlantParameters plant;
+  IntegratorOptions integrator;
+  std::vector<SineTorque> external_torque;
+  SensorOptions sensors;
+  double transport_delay_s = 0.0;  ///< torque k acts from t_k + delay; at most one sample period
+  JointArray initial_angle{};
+  JointArray initial_speed{};
+
+  /// Strict reading. INIT-ONLY. Throws InputError naming file, field, what was found and what was expected.
+  static Scenario load(const std::string& path);
+  static Scenario parse(std::string_view bytes, const std::string& source);
+
+  int joints() const noexcept;
+
+  /// The true plant at rest under no control torque, external torque attached. INIT-ONLY. Throws InputError.
+  std::unique_ptr<Plant> make_plant() const;
+};
+
+}  // namespace quasilpv

@@ -1,0 +1,61 @@
+// What the controller gets to see of the plant.
+#pragma once
+
+#include <cstdint>
+#include <random>
+
+#include "quasilpv/step.hpp"
+
+namespace quasilpv {
+
+/// Sensor imperfections of a scenario.
+struct SensorOptions {
+  int encoder_bits = 0;               ///< 0: exact angles; else the angle is a multiple of 2 pi / 2^bits
+  double velocity_noise_rad_s = 0.0;  ///< standard deviation of the white noise on the measured speed
+  std::uint64_t seed = 0;
+};
+
+/// Joint angles (rad) and speeds (rad/s) as measured at sample `seq`, plant time seq T.
+struct Measurement {
+  std::int64_t seq = 0;
+  JointArray angle{};
+  JointArray speed{};
+};
+
+/// The multiple of `quantum` nearest to `angle` (ties away from zero); `quantum` = 0 returns `angle`.
+/// RT-SAFE (bounded, no allocation, no lock, no throw).
+double quantise(double angle, double quantum) noexcept;
+
+/// Standard normal deviates that are the same on every standard library: std::normal_distribution leaves its algorithm
+/// to the implementation, so this is Box and Muller (1958) on the 53 high bits of std::mt19937_64.
+class GaussianNoise {
+ public:
+  explicit GaussianNoise(std::uint64_t seed) : generator_(seed) {}
+  double operator()();
+
+ private:
+  double uniform();  // in [0, 1)
+
+  std::mt19937_64 generator_;
+  double spare_ = 0.0;
+  bool has_spare_ = false;
+};
+
+/// Encoders and noisy speeds of n joints. Every call to measure() draws new noise, so call it once per sample.
+class Sensors {
+ public:
+  /// INIT-ONLY.
+  Sensors(const SensorOptions& options, int joints);
+
+  Measurement measure(std::int64_t seq, const JointArray& angle, const JointArray& speed);
+
+  double angle_quantum_rad() const noexcept { return quantum_; }
+
+ private:
+  int joints_;
+  double quantum_;
+  double velocity_noise_;
+  GaussianNoise noise_;
+};
+
+}  // namespace quasilpv

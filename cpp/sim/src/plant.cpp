@@ -1,0 +1,21 @@
+#include "quasilpv/plant.hpp"
+
+namespace quasilpv {
+
+Eigen::VectorXd Plant::differential() const { return Eigen::VectorXd::Ones(size()); }
+
+Eigen::VectorXd Plant::absolute_tolerance(double tolerance) const {
+  return Eigen::VectorXd::Constant(size(), tolerance);
+}
+
+void Plant::make_consistent(double t, Vector y, Vector y_dot) const { derivative(t, y, y_dot); }
+
+JointArray Plant::joint_torque(double t) const noexcept {
+  JointArray torque = external_.at(t);
+  for (std::size_t j = 0; j < torque.size(); ++j) {
+    torque[j] += torque_[j];
+  }
+  return torque;
+}
+
+}  // namespace quasilpv

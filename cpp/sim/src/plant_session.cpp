@@ -1,0 +1,84 @@
+#include "quasilpv/plant_session.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "quasilpv/errors.hpp"
+
+namespace quasilpv {
+namespace {
+
+// The shortest interval worth integrating, s.
+constexpr double kShortestInterval = 1e-9;
+
+std::int64_t count_samples(const Scenario& scenario, double sample_period_s) {
+  const std::string source = "scenario '" + scenario.name + "'";
+  if (!std::isfinite(sample_period_s) || sample_period_s <= 10.0 * kShortestInterval) {
+    throw InputError(source, "sample period", std::to_string(sample_period_s) + " s", "more than 10 ns");
+  }
+  if (scenario.transport_delay_s < 0.0 || scenario.transport_delay_s > sample_period_s) {
+    throw InputError(source, "transport_delay_s", std::to_string(scenario.transport_delay_s),
+                     "0 to the sample period, " + std::to_string(sample_period_s));
+  }
+  const std::int64_t samples = std::llround(scenario.duration_s / sample_period_s);
+  if (samples < 1) {
+    throw InputError(source, "duration_s", std::to_string(scenario.duration_s),
+                     "at least one sample of " + std::to_string(sample_period_s) + " s");
+  }
+  return samples;
+}
+
+}  // namespace
+
+PlantSession::PlantSession(const Scenario& scenario, double sample_period_s)
+    : plant_(scenario.make_plant()),
+      sensors_(scenario.sensors, plant_->joints()),
+      sample_period_s_(sample_period_s),
+      transport_delay_s_(scenario.transport_delay_s),
+      samples_(count_samples(scenario, sample_period_s)),
+      state_(plant_->initial_state(scenario.initial_angle, scenario.initial_speed)) {
+  integrator_ = make_integrator(scenario.integrator, *plant_, sample_period_s);
+  observe(0.0);
+}
+
+void PlantSession::expect_current(std::int64_t k) const {
+  if (k != seq_) {
+    throw InputError("plant session", "seq", std::to_string(k), std::to_string(seq_));
+  }
+}
+
+// Truth and measurement at the end of an interval, under the torque that acted on it.
+void PlantSession::observe(double time_s) {
+  truth_ = plant_->sample(time_s, state_);
+  measurement_ = sensors_.measure(seq_, truth_.angle, truth_.speed);
+}
+
+const Measurement& PlantSession::measure(std::int64_t k) const {
+  expect_current(k);
+  return measurement_;
+}
+
+void PlantSession::advance(std::int64_t k, const JointArray& torque, double delay_s) {
+  expect_current(k);
+  const double start = static_cast<double>(k) * sample_period_s_;
+  const double end = static_cast<double>(k + 1) * sample_period_s_;
+  const double jump = std::clamp(start + delay_s, start, end);
+  const bool old_torque_acts = jump - start > kShortestInterval;
+  const bool new_torque_acts = end - jump > kShortestInterval;
+  if (!old_torque_acts) {
+    plant_->set_torque(torque);
+    integrator_->advance(start, end, state_);
+  } else if (!new_torque_acts) {
+    integrator_->advance(start, end, state_);
+  } else {
+    integrator_->advance(start, jump, state_);
+    plant_->set_torque(torque);
+    integrator_->advance(jump, end, state_);
+  }
+  ++seq_;
+  observe(end);
+  plant_->set_torque(torque);
+}
+
+}  // namespace quasilpv

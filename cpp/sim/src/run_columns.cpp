@@ -1,0 +1,53 @@
+#include "quasilpv/run_columns.hpp"
+
+namespace quasilpv {
+
+PlantColumns::PlantColumns(Record& record, int joints) : record_(record) {
+  const auto width = static_cast<std::size_t>(joints);
+  angle_ = record.add_column("angle_rad", width);
+  speed_ = record.add_column("speed_rad_s", width);
+  acceleration_ = record.add_column("acceleration_rad_s2", width);
+  external_torque_ = record.add_column("external_torque_nm", width);
+}
+
+void PlantColumns::append(const PlantSample& sample) {
+  record_.append(angle_, sample.angle);
+  record_.append(speed_, sample.speed);
+  record_.append(acceleration_, sample.acceleration);
+  record_.append(external_torque_, sample.external_torque);
+}
+
+StepColumns::StepColumns(Record& record, int joints) : record_(record) {
+  const auto width = static_cast<std::size_t>(joints);
+  measured_angle_ = record.add_column("measured_angle_rad", width);
+  measured_speed_ = record.add_column("measured_speed_rad_s", width);
+  reference_angle_ = record.add_column("reference_angle_rad", width);
+  reference_speed_ = record.add_column("reference_speed_rad_s", width);
+  reference_acceleration_ = record.add_column("reference_acceleration_rad_s2", width);
+  torque_commanded_ = record.add_column("torque_commanded_nm", width);
+  torque_applied_ = record.add_column("torque_applied_nm", width);
+  estimated_angle_ = record.add_column("estimated_angle_rad", width);
+  estimated_speed_ = record.add_column("estimated_speed_rad_s", width);
+  estimated_disturbance_ = record.add_column("estimated_disturbance", width);
+  filtered_disturbance_ = record.add_column("filtered_disturbance", width);
+  integral_error_ = record.add_column("integral_error_rad_s", width);
+  flags_ = record.add_column("flags");
+}
+
+void StepColumns::append(const StepInput& input, const StepReport& report) {
+  record_.append(measured_angle_, input.angle);
+  record_.append(measured_speed_, input.speed);
+  record_.append(reference_angle_, input.reference.angle);
+  record_.append(reference_speed_, input.reference.speed);
+  record_.append(reference_acceleration_, input.reference.acceleration);
+  record_.append(torque_commanded_, report.torque_commanded);
+  record_.append(torque_applied_, report.torque_applied);
+  record_.append(estimated_angle_, report.estimated_angle);
+  record_.append(estimated_speed_, report.estimated_speed);
+  record_.append(estimated_disturbance_, report.estimated_disturbance);
+  record_.append(filtered_disturbance_, report.filtered_disturbance);
+  record_.append(integral_error_, report.integral_error);
+  record_.append(flags_, static_cast<double>(report.flags));
+}
+
+}  // namespace quasilpv

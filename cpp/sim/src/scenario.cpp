@@ -1,0 +1,132 @@
+#include "quasilpv/scenario.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+#include "quasilpv/document.hpp"
+
+namespace quasilpv {
+namespace {
+
+constexpr int kMaxEncoderBits = 32;
+constexpr std::int64_t kMaxSeed = 9007199254740991;  // 2^53 - 1, the largest integer every JSON reader keeps
+constexpr int kMaxStepsPerSample = 1000000;
+constexpr std::size_t kMaxSines = 1000;
+
+double not_negative(const Field& field) {
+  const double value = field.number();
+  if (value < 0.0) {
+    field.fail(field.json().dump(), "a number >= 0");
+  }
+  return value;
+}
+
+JointArray joint_array(const Field& field, int joints) {
+  const std::vector<double> values = field.numbers(static_cast<std::size_t>(joints));
+  JointArray array{};
+  std::copy(values.begin(), values.end(), array.begin());
+  return array;
+}
+
+SerialArmParameters serial_arm(const Field& field, const std::string& source) {
+  field.only({"kind", "label", "gravity_m_s2", "links"});
+  SerialArmParameters arm;
+  arm.label = field["label"].text();
+  arm.gravity_m_s2 = field["gravity_m_s2"].number();
+  const Field links = field["links"];
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    const Field link = links.at(k);
+    link.only({"length_m", "mass_kg", "com_m", "inertia_kg_m2", "friction_nm_s"});
+    arm.links.push_back({link["length_m"].number(), link["mass_kg"].number(), link["com_m"].number(),
+                         link["inertia_kg_m2"].number(), link["friction_nm_s"].number()});
+  }
+  check_serial_arm(arm, source, field.path());
+  return arm;
+}
+
+PlantParameters plant(const Field& field, const std::string& source) {
+  const std::string kind = field["kind"].text();
+  if (kind == "serial-arm") {
+    return serial_arm(field, source);
+  }
+  field["kind"].fail("\"" + kind + "\"", "\"serial-arm\"");
+}
+
+IntegratorOptions integrator(const Field& field) {
+  const std::string kind = field["kind"].text();
+  if (kind == "ida") {
+    field.only({"kind", "relative_tolerance", "absolute_tolerance"});
+    return IdaOptions{field["relative_tolerance"].positive(), field["absolute_tolerance"].positive()};
+  }
+  if (kind == "rk4") {
+    field.only({"kind", "steps_per_sample"});
+    return Rk4Options{static_cast<int>(field["steps_per_sample"].integer(1, kMaxStepsPerSample))};
+  }
+  field["kind"].fail("\"" + kind + "\"", "\"ida\" or \"rk4\"");
+}
+
+std::vector<SineTorque> external_torque(const Field& field, int joints) {
+  if (field.size() > kMaxSines) {
+    field.fail(std::to_string(field.size()) + " terms", "at most " + std::to_string(kMaxSines));
+  }
+  std::vector<SineTorque> terms;
+  for (std::size_t i = 0; i < field.size(); ++i) {
+    const Field term = field.at(i);
+    term.only({"joint", "amplitude_nm", "frequency_rad_s", "phase_rad"});
+    terms.push_back({static_cast<int>(term["joint"].integer(0, joints - 1)), term["amplitude_nm"].number(),
+                     term["frequency_rad_s"].number(), term["phase_rad"].number()});
+  }
+  return terms;
+}
+
+SensorOptions sensors(const Field& field) {
+  field.only({"encoder_bits", "velocity_noise_rad_s", "seed"});
+  SensorOptions options;
+  options.encoder_bits = static_cast<int>(field["encoder_bits"].integer(0, kMaxEncoderBits));
+  options.velocity_noise_rad_s = not_negative(field["velocity_noise_rad_s"]);
+  options.seed = static_cast<std::uint64_t>(field["seed"].integer(0, kMaxSeed));
+  return options;
+}
+
+int joints_of(const SerialArmParameters& arm) { return static_cast<int>(arm.links.size()); }
+std::unique_ptr<Plant> make(const SerialArmParameters& arm) { return std::make_unique<SerialArm>(arm); }
+
+}  // namespace
+
+Scenario Scenario::load(const std::string& path) { return parse(read_file(path), path); }
+
+Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
+  const Json document = parse_strict_json(bytes, source);
+  const Field root(document, source, "");
+  root.only({"schema", "schema_version", "name", "duration_s", "plant", "integrator", "external_torque", "sensors",
+             "transport_delay_s", "initial"});
+  root["schema"].expect_text("quasilpv.scenario");
+  static_cast<void>(root["schema_version"].integer(1, 1));
+  Scenario scenario;
+  scenario.name = root["name"].text();
+  scenario.duration_s = root["duration_s"].positive();
+  scenario.plant = quasilpv::plant(root["plant"], source);
+  const int n = scenario.joints();
+  scenario.integrator = quasilpv::integrator(root["integrator"]);
+  scenario.external_torque = quasilpv::external_torque(root["external_torque"], n);
+  scenario.sensors = quasilpv::sensors(root["sensors"]);
+  scenario.transport_delay_s = not_negative(root["transport_delay_s"]);
+  const Field initial = root["initial"];
+  initial.only({"angle_rad", "speed_rad_s"});
+  scenario.initial_angle = joint_array(initial["angle_rad"], n);
+  scenario.initial_speed = joint_array(initial["speed_rad_s"], n);
+  return scenario;
+}
+
+int Scenario::joints() const noexcept {
+  return std::visit([](const auto& parameters) { return joints_of(parameters); }, plant);
+}
+
+std::unique_ptr<Plant> Scenario::make_plant() const {
+  std::unique_ptr<Plant> made = std::visit([](const auto& parameters) { return make(parameters); }, plant);
+  made->set_external_torque(ExternalTorque(external_torque));
+  return made;
+}
+
+}  // namespace quasilpv

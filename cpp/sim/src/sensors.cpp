@@ -1,0 +1,46 @@
+#include "quasilpv/sensors.hpp"
+
+#include <cmath>
+
+namespace quasilpv {
+namespace {
+
+constexpr double kTwoPi = 6.283185307179586476925286766559;
+
+}  // namespace
+
+double quantise(double angle, double quantum) noexcept {
+  return quantum > 0.0 ? std::round(angle / quantum) * quantum : angle;
+}
+
+double GaussianNoise::uniform() { return static_cast<double>(generator_() >> 11) * 0x1p-53; }
+
+double GaussianNoise::operator()() {
+  if (has_spare_) {
+    has_spare_ = false;
+    return spare_;
+  }
+  const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));  // the argument of log is in (0, 1]
+  const double phase = kTwoPi * uniform();
+  spare_ = radius * std::sin(phase);
+  has_spare_ = true;
+  return radius * std::cos(phase);
+}
+
+Sensors::Sensors(const SensorOptions& options, int joints)
+    : joints_(joints),
+      quantum_(options.encoder_bits > 0 ? std::ldexp(kTwoPi, -options.encoder_bits) : 0.0),
+      velocity_noise_(options.velocity_noise_rad_s),
+      noise_(options.seed) {}
+
+Measurement Sensors::measure(std::int64_t seq, const JointArray& angle, const JointArray& speed) {
+  Measurement measurement;
+  measurement.seq = seq;
+  for (std::size_t j = 0; j < static_cast<std::size_t>(joints_); ++j) {
+    measurement.angle[j] = quantise(angle[j], quantum_);
+    measurement.speed[j] = velocity_noise_ > 0.0 ? speed[j] + velocity_noise_ * noise_() : speed[j];
+  }
+  return measurement;
+}
+
+}  // namespace quasilpv

@@ -1,0 +1,56 @@
+#include "quasilpv/simulation.hpp"
+
+#include <string>
+
+#include "quasilpv/errors.hpp"
+#include "quasilpv/plant_session.hpp"
+#include "quasilpv/run_columns.hpp"
+
+namespace quasilpv {
+
+RunRecord run_closed_loop(const Scenario& scenario, double sample_period_s, const StepFunction& step,
+                          const ReferenceFunction& reference) {
+  PlantSession session(scenario, sample_period_s);
+  RunRecord run;
+  run.sample_period_s = sample_period_s;
+  run.joints = session.joints();
+  const std::size_t time = run.samples.add_column("time_s");
+  PlantColumns plant_columns(run.samples, run.joints);
+  StepColumns step_columns(run.samples, run.joints);
+  run.samples.reserve(static_cast<std::size_t>(session.samples()));
+
+  for (std::int64_t k = 0; k < session.samples(); ++k) {
+    const double t = static_cast<double>(k) * sample_period_s;
+    const Measurement& measurement = session.measure(k);
+    StepInput input;
+    input.seq = k;
+    input.angle = measurement.angle;
+    input.speed = measurement.speed;
+    input.reference = reference(t);
+    const StepReport report = step(input);
+
+    run.flags |= report.flags;
+    run.samples.append(time, t);
+    plant_columns.append(session.truth());
+    step_columns.append(input, report);
+    session.advance(k, report.torque_applied);
+  }
+  return run;
+}
+
+RunRecord run_closed_loop(const Scenario& scenario, Controller& controller, const Trajectory& trajectory) {
+  const auto require_joints = [&](const std::string& source, int joints) {
+    if (joints != scenario.joints()) {
+      throw InputError(source, "joints", std::to_string(joints),
+                       std::to_string(scenario.joints()) + " as in scenario '" + scenario.name + "'");
+    }
+  };
+  require_joints("controller", controller.joints());
+  require_joints("trajectory '" + trajectory.name() + "'", trajectory.joints());
+  controller.reset();
+  return run_closed_loop(
+      scenario, controller.sample_period_s(), [&](const StepInput& input) { return controller.step(input); },
+      [&](double time_s) { return trajectory.evaluate(time_s); });
+}
+
+}  // namespace quasilpv
