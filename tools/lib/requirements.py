@@ -4,9 +4,9 @@ import tomllib
 from pathlib import Path
 
 project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))
-print(
+requirements = [
     *project["build-system"]["requires"],
     *project["project"]["dependencies"],
     *project["project"]["optional-dependencies"]["dev"],
-    sep="\n",
-)
+]
+print(*dict.fromkeys(requirements), sep="\n")
