@@ -25,6 +25,7 @@ LAYERS = (
     {"experiments"},
     {"figures"},
     {"cli"},
+    {"__main__"},
 )
 RANK = {room: rank for rank, layer in enumerate(LAYERS) for room in layer}
 
