@@ -14,16 +14,15 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, NoReturn
 
 import cbor2
 import rfc8785
 
+from quasilpv.artifact.files import MAX_FILE_BYTES
 from quasilpv.errors import InputError
 
 MAX_DEPTH = 32
-MAX_FILE_BYTES = 64 * 1024 * 1024
 MAX_SAFE_INTEGER = 2**53 - 1
 
 Document = dict[str, Any]
@@ -179,22 +178,6 @@ def parse_strict_json(data: bytes, source: str) -> Document:
     except RecursionError as error:
         raise InputError(source, "document", "a deeper document", f"nesting of at most {MAX_DEPTH} levels") from error
     return _require_object(normalise(tree, source), source)
-
-
-def read_bytes(path: Path | str) -> bytes:
-    """Return the content of a file of at most ``MAX_FILE_BYTES`` bytes.
-
-    Raises:
-        InputError: the file is missing, unreadable or too large.
-    """
-    path = Path(path)
-    try:
-        size = path.stat().st_size
-        if size > MAX_FILE_BYTES:
-            raise InputError(str(path), "size", f"{size} bytes", f"at most {MAX_FILE_BYTES} bytes")
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(str(path), "file", error.strerror or error, "a readable file") from error
 
 
 def _parse_cbor(data: bytes, source: str) -> Document:

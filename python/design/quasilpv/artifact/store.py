@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from quasilpv.artifact.canonical import canonical_cbor, canonical_json, member_path, parse_document, read_bytes
+from quasilpv.artifact.canonical import canonical_cbor, canonical_json, member_path, parse_document
+from quasilpv.artifact.files import read_bytes, write_atomically
 from quasilpv.artifact.schema import Artifact
-from quasilpv.errors import InputError
 
 JSON_NAME = "artifact.json"
 CBOR_NAME = "artifact.cbor"
@@ -50,32 +48,6 @@ def read_artifact(path: Path | str) -> Artifact:
     """
     source = str(path)
     return Artifact.from_document(parse_document(read_bytes(path), source), source)
-
-
-def write_atomically(contents: Mapping[Path, bytes]) -> None:
-    """Write files so that each has its old or its new content, never a part: temporary files first, then renames.
-
-    Raises:
-        InputError: a file cannot be written; the temporary files are removed.
-    """
-    temporary: dict[Path, Path] = {}
-    target = next(iter(contents))
-    try:
-        for target, data in contents.items():
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}-", delete=False) as file:
-                temporary[target] = Path(file.name)
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            temporary[target].chmod(0o644)
-        for target, path in temporary.items():
-            path.replace(target)
-    except OSError as error:
-        raise InputError(str(target), "file", error.strerror or error, "a writable file") from error
-    finally:
-        for path in temporary.values():
-            path.unlink(missing_ok=True)
 
 
 def diff(left: Artifact, right: Artifact) -> list[Difference]:

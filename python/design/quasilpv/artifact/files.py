@@ -1,0 +1,54 @@
+"""Files read whole and written whole."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from quasilpv.errors import InputError
+
+MAX_FILE_BYTES = 64 * 1024 * 1024
+
+
+def read_bytes(path: Path | str) -> bytes:
+    """Return the content of a file of at most ``MAX_FILE_BYTES`` bytes.
+
+    Raises:
+        InputError: the file is missing, unreadable or too large.
+    """
+    path = Path(path)
+    try:
+        size = path.stat().st_size
+        if size > MAX_FILE_BYTES:
+            raise InputError(str(path), "size", f"{size} bytes", f"at most {MAX_FILE_BYTES} bytes")
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(str(path), "file", error.strerror or error, "a readable file") from error
+
+
+def write_atomically(contents: Mapping[Path, bytes]) -> None:
+    """Write files so that each has its old or its new content, never a part: temporary files first, then renames.
+
+    Raises:
+        InputError: a file cannot be written; the temporary files are removed.
+    """
+    temporary: dict[Path, Path] = {}
+    target = next(iter(contents))
+    try:
+        for target, data in contents.items():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}-", delete=False) as file:
+                temporary[target] = Path(file.name)
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary[target].chmod(0o644)
+        for target, path in temporary.items():
+            path.replace(target)
+    except OSError as error:
+        raise InputError(str(target), "file", error.strerror or error, "a writable file") from error
+    finally:
+        for path in temporary.values():
+            path.unlink(missing_ok=True)

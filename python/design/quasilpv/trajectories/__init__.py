@@ -1,0 +1,18 @@
+"""References: task-space paths, the joint-space trajectories planned from them, and their files."""
+
+from quasilpv.trajectories.document import Reference, Trajectory, read_trajectory, write_trajectory
+from quasilpv.trajectories.library import serial_circle, serial_square
+from quasilpv.trajectories.paths import TaskPath, read_path
+from quasilpv.trajectories.planning import plan
+
+__all__ = [
+    "Reference",
+    "TaskPath",
+    "Trajectory",
+    "plan",
+    "read_path",
+    "read_trajectory",
+    "serial_circle",
+    "serial_square",
+    "write_trajectory",
+]

@@ -1,0 +1,52 @@
+"""The references of the serial arm's tracking experiments.
+
+Dehak (2022, III.3.3 and IV.5.1) says only that the tool follows a square and three quarters of a circle in the vertical
+plane within 3 s; places, sizes, time law and tool orientation are this project's choice. The orientation of 45 degrees
+lets errors of the last joint show in both X and Y.
+"""
+
+from __future__ import annotations
+
+import math
+
+from quasilpv.systems.arm_parameters import OperatingDomain
+from quasilpv.trajectories.document import Trajectory
+from quasilpv.trajectories.paths import ArcSegment, LineSegment, Segment, TaskPath
+from quasilpv.trajectories.planning import Kinematics, plan
+
+SQUARE = TaskPath(
+    name="serial-square",
+    tool_angle_rad=math.pi / 4,
+    start=(1.3, -1.75),
+    segments=tuple(
+        Segment(line=LineSegment(to=corner, duration_s=0.75))
+        for corner in ((1.7, -1.75), (1.7, -1.35), (1.3, -1.35), (1.3, -1.75))
+    ),
+)
+"""A square of side 0.4 m about (1.5, -1.55), from its lower left corner counter-clockwise, 0.75 s a side."""
+
+CIRCLE = TaskPath(
+    name="serial-circle",
+    tool_angle_rad=math.pi / 4,
+    start=(1.7, -1.55),
+    segments=(Segment(arc=ArcSegment(centre=(1.5, -1.55), angle_rad=1.5 * math.pi, duration_s=3.0)),),
+)
+"""Three quarters of the circle of radius 0.2 m about (1.5, -1.55), from angle 0 counter-clockwise, in 3 s."""
+
+
+def serial_square(arm: Kinematics, domain: OperatingDomain | None = None) -> Trajectory:
+    """Return the trajectory of the 3-DoF arm along ``SQUARE``.
+
+    Raises:
+        InputError: as ``plan``.
+    """
+    return plan(arm, SQUARE, domain)
+
+
+def serial_circle(arm: Kinematics, domain: OperatingDomain | None = None) -> Trajectory:
+    """Return the trajectory of the 3-DoF arm along ``CIRCLE``.
+
+    Raises:
+        InputError: as ``plan``.
+    """
+    return plan(arm, CIRCLE, domain)

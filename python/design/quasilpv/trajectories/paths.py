@@ -1,0 +1,192 @@
+"""Task-space paths: what the tool does in the plane of the arm, and when.
+
+A path is a start point and segments, straight lines and circular arcs. Each segment starts and ends at rest, with the
+septic time law ``q(s) = 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7`` (velocity, acceleration and jerk vanish at both ends); the
+tool keeps one orientation. Frame: the arm's base frame, X to the right, Y up, metres and radians.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, model_validator
+
+from quasilpv.artifact.canonical import parse_strict_json
+from quasilpv.artifact.files import read_bytes
+from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
+
+Array = npt.NDArray[np.float64]
+Point = tuple[float, float]
+Duration = Annotated[float, Field(gt=0)]
+
+MAX_DURATION_S = 600.0
+
+
+class TaskMotion(NamedTuple):
+    """Tool position (2), m, velocity (2), m/s, and acceleration (2), m/s^2, at one instant."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+def septic(s: float) -> tuple[float, float, float]:
+    """Return q(s) and two derivatives for s in [0, 1]: q(0) = 0, q(1) = 1, three derivatives vanish at both ends."""
+    value = s**4 * (35.0 + s * (-84.0 + s * (70.0 - 20.0 * s)))
+    first = 140.0 * (s * (1.0 - s)) ** 3
+    second = 420.0 * (s * (1.0 - s)) ** 2 * (1.0 - 2.0 * s)
+    return value, first, second
+
+
+class LineSegment(StrictModel):
+    """A straight line from the current point to ``to``."""
+
+    to: Point
+    duration_s: Duration
+
+
+class ArcSegment(StrictModel):
+    """A circular arc about ``centre`` from the current point, counter-clockwise for a positive angle."""
+
+    centre: Point
+    angle_rad: float
+    duration_s: Duration
+
+
+class Segment(StrictModel):
+    """One segment: exactly one of ``line`` and ``arc``."""
+
+    line: LineSegment | None = None
+    arc: ArcSegment | None = None
+
+    @model_validator(mode="after")
+    def _check_one(self) -> Self:
+        if (self.line is None) == (self.arc is None):
+            raise FieldError("line", "both or neither of line and arc", "exactly one of line and arc")
+        return self
+
+    @property
+    def duration_s(self) -> float:
+        """Time the segment takes."""
+        return self.line.duration_s if self.line is not None else self._arc.duration_s
+
+    @property
+    def _arc(self) -> ArcSegment:
+        assert self.arc is not None
+        return self.arc
+
+    def curve(self, start: Point) -> Line | Arc:
+        """Return the curve of the segment when it starts at ``start``."""
+        if self.line is not None:
+            return Line(start, self.line.to)
+        dx, dy = start[0] - self._arc.centre[0], start[1] - self._arc.centre[1]
+        return Arc(self._arc.centre, math.hypot(dx, dy), math.atan2(dy, dx), self._arc.angle_rad)
+
+
+class TaskPath(StrictModel):
+    """A named path of the tool with constant orientation ``tool_angle_rad`` (Phi, from the downward vertical)."""
+
+    name: Annotated[str, Field(min_length=1)]
+    tool_angle_rad: float
+    start: Point
+    segments: Annotated[tuple[Segment, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _check_geometry(self) -> Self:
+        point = self.start
+        for i, segment in enumerate(self.segments):
+            curve = segment.curve(point)
+            if isinstance(curve, Arc) and curve.radius == 0.0:
+                raise FieldError(f"segments[{i}].arc.centre", list(curve.centre), "a centre other than the arc's start")
+            point = curve.end
+        if self.duration_s > MAX_DURATION_S:
+            raise FieldError("segments", f"{self.duration_s} s in all", f"at most {MAX_DURATION_S} s")
+        return self
+
+    @property
+    def duration_s(self) -> float:
+        """Time from start to end."""
+        return self.segment_times_s[-1]
+
+    @cached_property
+    def segment_times_s(self) -> tuple[float, ...]:
+        """The times at which segments start, and the end of the last one."""
+        times = [0.0]
+        for segment in self.segments:
+            times.append(times[-1] + segment.duration_s)
+        return tuple(times)
+
+    @cached_property
+    def _curves(self) -> tuple[Line | Arc, ...]:
+        curves: list[Line | Arc] = []
+        point = self.start
+        for segment in self.segments:
+            curves.append(segment.curve(point))
+            point = curves[-1].end
+        return tuple(curves)
+
+    def segment_at(self, time_s: float) -> int:
+        """Return the index of the segment under way at a time; the first before 0, the last after the end."""
+        return int(np.clip(np.searchsorted(self.segment_times_s, time_s, side="right") - 1, 0, len(self.segments) - 1))
+
+    def evaluate(self, time_s: float) -> TaskMotion:
+        """Return where the tool is at a time and how it moves: at rest before 0 and after the end."""
+        i = self.segment_at(time_s)
+        duration = self.segments[i].duration_s
+        progress, rate, curvature = septic(min(max((time_s - self.segment_times_s[i]) / duration, 0.0), 1.0))
+        position, first, second = self._curves[i].evaluate(progress)
+        velocity = first * (rate / duration)
+        acceleration = second * (rate / duration) ** 2 + first * (curvature / duration**2)
+        return TaskMotion(position, velocity, acceleration)
+
+
+@dataclass(frozen=True)
+class Line:
+    """The points from ``start`` to ``end``, over a parameter from 0 to 1."""
+
+    start: Point
+    end: Point
+
+    def evaluate(self, progress: float) -> tuple[Array, Array, Array]:
+        """Return the point at ``progress`` and its first two derivatives with respect to it."""
+        start, end = np.array(self.start), np.array(self.end)
+        return (1.0 - progress) * start + progress * end, end - start, np.zeros(2)
+
+
+@dataclass(frozen=True)
+class Arc:
+    """The points of a circle from ``start_angle_rad`` on over ``angle_rad``, over a parameter from 0 to 1."""
+
+    centre: Point
+    radius: float
+    start_angle_rad: float
+    angle_rad: float
+
+    @property
+    def end(self) -> Point:
+        """Last point."""
+        point, _, _ = self.evaluate(1.0)
+        return float(point[0]), float(point[1])
+
+    def evaluate(self, progress: float) -> tuple[Array, Array, Array]:
+        """Return the point at ``progress`` and its first two derivatives with respect to it."""
+        angle = self.start_angle_rad + progress * self.angle_rad
+        radial = self.radius * np.array([math.cos(angle), math.sin(angle)])
+        tangential = np.array([-radial[1], radial[0]])
+        return np.array(self.centre) + radial, self.angle_rad * tangential, -(self.angle_rad**2) * radial
+
+
+def read_path(path: Path | str) -> TaskPath:
+    """Read a path file: ``{"name", "tool_angle_rad", "start": [x, y], "segments": [{"line": ...}, {"arc": ...}]}``.
+
+    Raises:
+        InputError: the file cannot be read, is not strict JSON, or is not a path; the message names the field.
+    """
+    source = str(path)
+    return validate(TaskPath, parse_strict_json(read_bytes(path), source), source)
