@@ -2,10 +2,11 @@
 # Runs every quick linter over the tracked files, all of them even if one complains.
 set -uo pipefail
 cd "$(dirname "$0")/../.." || exit
+git rev-parse --is-inside-work-tree || exit # without git there would be no files to look at
 
 status=0
 lint() {
-  printf '== %s\n' "$*"
+  printf '== %s\n' "${*:1:3}"
   "$@" || status=1
 }
 
@@ -16,5 +17,5 @@ lint .venv/bin/ruff check .
 lint .venv/bin/ruff format --check .
 lint .venv/bin/mypy
 lint clang-format --dry-run -Werror "${cpp_files[@]}"
-lint shellcheck --external-sources --source-path=. "${shell_files[@]}"
+lint shellcheck --external-sources --check-sourced --source-path=. "${shell_files[@]}"
 exit "$status"
