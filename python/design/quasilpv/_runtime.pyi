@@ -1,0 +1,149 @@
+"""The C++ runtime library. All arrays are of double; joint arrays have shape (joints,), SI units."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+_Array = npt.NDArray[np.float64]
+
+def canonical_json(document: Any) -> bytes:
+    """RFC 8785 bytes of a tree of dict, list, str, bool, None, int and float."""
+
+def canonical_cbor(document: Any) -> bytes:
+    """Deterministic CBOR bytes (RFC 8949 section 4.2) of the same trees."""
+
+def parse_document(data: bytes, source: str = "document") -> Any:
+    """Tree of a hashed document from the bytes of either twin; refused unless canonical and its hash agrees."""
+
+class Artifact:
+    """A validated controller as data. Immutable."""
+
+    @staticmethod
+    def load(path: str) -> Artifact: ...
+    @staticmethod
+    def parse(data: bytes, source: str = "artifact") -> Artifact: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def hash(self) -> str: ...
+    @property
+    def robot_id(self) -> str: ...
+    @property
+    def law_kind(self) -> str: ...
+    @property
+    def sample_period_s(self) -> float: ...
+    @property
+    def joints(self) -> int: ...
+    def premises(self, angle: npt.ArrayLike) -> _Array:
+        """z(y), not clamped, shape (premises,)."""
+
+    def gravity(self, angle: npt.ArrayLike) -> _Array:
+        """G(y), N m."""
+
+    def coriolis(self, angle: npt.ArrayLike, speed: npt.ArrayLike, reference_speed: npt.ArrayLike) -> _Array:
+        """N(y, w) r' of a PID law, N(y, w) w of a computed-torque law, N m."""
+
+    def inertia(self, premise: npt.ArrayLike) -> _Array:
+        """M_n(z), kg m^2, shape (joints, joints); z is clamped to its box."""
+
+class StepReport:
+    """What one step computed; joint arrays have shape (7,), zero past the joints."""
+
+    @property
+    def seq(self) -> int: ...
+    @property
+    def flags(self) -> int: ...
+    @property
+    def torque_commanded(self) -> _Array: ...
+    @property
+    def torque_applied(self) -> _Array: ...
+    @property
+    def estimated_angle(self) -> _Array: ...
+    @property
+    def estimated_speed(self) -> _Array: ...
+    @property
+    def estimated_disturbance(self) -> _Array: ...
+    @property
+    def filtered_disturbance(self) -> _Array: ...
+    @property
+    def integral_error(self) -> _Array: ...
+
+class Controller:
+    """Law, state and workspace of one artifact."""
+
+    def __init__(self, artifact: Artifact) -> None: ...
+    def step(
+        self,
+        angle: npt.ArrayLike,
+        reference_angle: npt.ArrayLike,
+        reference_speed: npt.ArrayLike,
+        reference_acceleration: npt.ArrayLike,
+        speed: npt.ArrayLike,
+        seq: int = 0,
+        valid: bool = True,
+    ) -> StepReport:
+        """One sample; arrays of shape (joints,)."""
+
+    def reset(self) -> None:
+        """Forget all state."""
+
+    @property
+    def joints(self) -> int: ...
+    @property
+    def sample_period_s(self) -> float: ...
+
+class Trajectory:
+    """Reference r(t), r'(t), r''(t): piecewise quintics in joint space."""
+
+    @staticmethod
+    def load(path: str) -> Trajectory: ...
+    @staticmethod
+    def parse(data: bytes, source: str = "trajectory") -> Trajectory: ...
+    def evaluate(self, time_s: float) -> tuple[_Array, _Array, _Array]:
+        """(r, r', r'') at a time, each of shape (joints,)."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def hash(self) -> str: ...
+    @property
+    def joints(self) -> int: ...
+    @property
+    def duration_s(self) -> float: ...
+
+class Scenario:
+    """The experiment: true plant, integrator, disturbance, sensors, delay."""
+
+    @staticmethod
+    def load(path: str) -> Scenario: ...
+    @staticmethod
+    def parse(data: bytes, source: str = "scenario") -> Scenario: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def duration_s(self) -> float: ...
+    @property
+    def joints(self) -> int: ...
+
+class Plant:
+    """The true plant of a scenario, its external torque attached."""
+
+    def __init__(self, scenario: Scenario) -> None: ...
+    @property
+    def joints(self) -> int: ...
+    @property
+    def size(self) -> int: ...
+    def residual(
+        self, time_s: float, state: npt.ArrayLike, derivative: npt.ArrayLike, torque: npt.ArrayLike
+    ) -> _Array:
+        """F(t, y, y') under a control torque (N m), shape (size,)."""
+
+    def derivative(self, time_s: float, state: npt.ArrayLike, torque: npt.ArrayLike) -> _Array:
+        """Forward dynamics: y' that makes the residual zero, shape (size,)."""
+
+    def mass_matrix(self, angle: npt.ArrayLike) -> _Array:
+        """M(theta), kg m^2, shape (joints, joints)."""
+
+def run_closed_loop(artifact: Artifact, trajectory: Trajectory, scenario: Scenario) -> dict[str, _Array]:
+    """The closed loop in lock-step: columns by name, shape (samples,) or (samples, joints)."""
