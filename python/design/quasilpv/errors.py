@@ -1,7 +1,7 @@
 """The exceptions of the package: a small hierarchy, one line per message.
 
-Misuse raises; the *outcome* of a computation (a solver that stops, a specification that is infeasible) is a value and never
-an exception of this module.
+Misuse raises; the *outcome* of a computation (a solver that stops, a specification that is infeasible) is a value and
+never an exception of this module.
 """
 
 from __future__ import annotations
@@ -12,16 +12,17 @@ class QuasilpvError(Exception):
 
 
 class InputError(QuasilpvError):
-    """A value given by the user cannot be used.
-
-    Args:
-        source: where the value came from, e.g. a file name, a class or ``"arm3"``.
-        field: which value, e.g. ``"links[1].inertia_kg_m2"``.
-        got: what was found (``str`` of it is printed, on one line).
-        expected: what is accepted, in words.
-    """
+    """A value given by the user cannot be used."""
 
     def __init__(self, source: str, field: str, got: object, expected: str) -> None:
+        """Compose the one-line message ``source: field: got ..., expected ...``.
+
+        Args:
+            source: where the value came from, e.g. a file name, a class or ``"arm3"``.
+            field: which value, e.g. ``"links[1].inertia_kg_m2"``.
+            got: what was found (``str`` of it is printed, on one line).
+            expected: what is accepted, in words.
+        """
         self.source = source
         self.field = field
         self.got = " ".join(str(got).split())
@@ -31,3 +32,23 @@ class InputError(QuasilpvError):
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
         """Rebuild from the four parts, so that the error survives a process boundary (parallel sweeps)."""
         return type(self), (self.source, self.field, self.got, self.expected)
+
+
+class PlantError(QuasilpvError):
+    """The plant could not be integrated, or reached a configuration where it is not defined (exit code 6)."""
+
+
+class TransportError(QuasilpvError):
+    """No transport between controller and plant (exit code 5)."""
+
+
+class FaultStop(QuasilpvError):  # noqa: N818 -- the machine's word: a stop, not a mistake of the program
+    """The controller latched a fault and stopped the run (exit code 3)."""
+
+
+class InfeasibleError(QuasilpvError):
+    """A specification cannot be met: no design exists in the family that was searched (exit code 1)."""
+
+
+class PlantError(QuasilpvError):
+    """The plant could not be integrated or reached a configuration where it is not defined (exit code 6)."""

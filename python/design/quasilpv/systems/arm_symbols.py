@@ -1,0 +1,154 @@
+"""The planar serial arm in symbols: the same closed form as `arms`, its premises and its descriptor model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import sympy as sp
+
+from quasilpv.errors import InputError
+from quasilpv.systems.arm_parameters import OperatingDomain
+from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.premise import Premise, PremiseKind
+
+if TYPE_CHECKING:
+    from quasilpv.systems.arms import PlanarSerialArm
+
+
+@dataclass(frozen=True)
+class SymbolicArm:
+    """``M theta'' + N omega + G = Gamma`` as sympy matrices.
+
+    Attributes:
+        theta: the n joint angles (rad), symbols ``theta_1`` ... ``theta_n``.
+        omega: the n joint speeds (rad/s), symbols ``omega_1`` ... ``omega_n``.
+        inertia: M(theta), n x n, kg m^2.
+        coriolis: N(theta, omega), n x n, friction included, in the arm's factorisation.
+        gravity: G(theta), n x 1, N m.
+        stiffness: H(theta), n x n, with G = H theta, N m.
+        velocity_premises: the scalar functions of (theta, omega) in which N is affine.
+        stiffness_premises: the scalar functions of theta in which H is affine.
+    """
+
+    theta: tuple[sp.Symbol, ...]
+    omega: tuple[sp.Symbol, ...]
+    inertia: sp.Matrix
+    coriolis: sp.Matrix
+    gravity: sp.Matrix
+    stiffness: sp.Matrix
+    velocity_premises: tuple[sp.Expr, ...]
+    stiffness_premises: tuple[sp.Expr, ...]
+
+    @classmethod
+    def of(cls, arm: PlanarSerialArm) -> SymbolicArm:
+        """Write the closed form of an arm."""
+        n = arm.joints
+        theta = sp.symbols(f"theta_1:{n + 1}", real=True)
+        omega = sp.symbols(f"omega_1:{n + 1}", real=True)
+        alpha = [sp.Add(*theta[: k + 1]) for k in range(n)]
+        W = [sp.Add(*omega[: k + 1]) for k in range(n)]
+        S = sp.Matrix([[int(i >= j) for j in range(n)] for i in range(n)])
+        D = arm.inertia_constants
+        gravity = [sp.Float(arm.equilibrium_sign * g) for g in arm.gravity_constants]
+
+        inertia = S.T * sp.Matrix(n, n, lambda k, j: sp.Float(D[k, j]) * sp.cos(alpha[k] - alpha[j])) * S
+        coriolis = S.T * sp.Matrix(n, n, lambda k, j: sp.Float(D[k, j]) * sp.sin(alpha[k] - alpha[j]) * W[j]) * S
+        if arm.printed_coriolis_shift:
+            shift = sp.Float(arm.printed_coriolis_shift * D[0, 1]) * sp.sin(theta[1])
+            coriolis[0, 0] += shift * omega[1]
+            coriolis[0, 1] -= shift * omega[0]
+        coriolis += sp.diag(*(sp.Float(f) for f in arm.friction_nm_s))
+        sinc_terms = sp.diag(*(g * sp.sinc(a) for g, a in zip(gravity, alpha, strict=True)))
+        return cls(
+            theta,
+            omega,
+            inertia.applyfunc(sp.expand),
+            coriolis.applyfunc(sp.expand),
+            S.T * sp.Matrix([g * sp.sin(a) for g, a in zip(gravity, alpha, strict=True)]),
+            (S.T * sinc_terms * S).applyfunc(sp.expand),
+            _velocity_premises(arm, theta, omega),
+            _stiffness_premises(arm, theta, gravity),
+        )
+
+    def inertia_premises(self, domain: OperatingDomain) -> tuple[Premise, ...]:
+        """See `PlanarSerialArm.inertia_premises`."""
+        n = len(self.theta)
+        cosines = [sp.cos(sum(self.theta[k + 1 : k + gap + 1])) for gap in range(1, n) for k in range(n - gap)]
+        return self._over(domain, cosines, first=1, kind=PremiseKind.MEASURED)
+
+    def premises(self, domain: OperatingDomain) -> tuple[Premise, ...]:
+        """All premises of the descriptor model, in the order of Example I.2 for n = 2, of Table I.3 otherwise."""
+        premises = self.inertia_premises(domain)
+        groups = [
+            (self.velocity_premises, PremiseKind.ESTIMATED),
+            (self.stiffness_premises, PremiseKind.MEASURED),
+        ]
+        for expressions, kind in reversed(groups) if len(self.theta) == 2 else groups:
+            premises += self._over(domain, expressions, first=len(premises) + 1, kind=kind)
+        return premises
+
+    def descriptor_system(self, name: str, domain: OperatingDomain) -> DescriptorSystem:
+        """See `PlanarSerialArm.as_descriptor_system`."""
+        n = len(self.theta)
+        identity, zero = sp.eye(n), sp.zeros(n, n)
+        return DescriptorSystem.from_symbols(
+            name=name,
+            state=self.theta + self.omega,
+            inputs=tuple(f"torque_{joint}" for joint in range(1, n + 1)),
+            E=sp.diag(identity, self.inertia),
+            A=sp.Matrix(sp.BlockMatrix([[zero, identity], [-self.stiffness, -self.coriolis]])),
+            B=sp.Matrix.vstack(zero, identity),
+            C=sp.Matrix.hstack(identity, zero),
+            premises=self.premises(domain),
+            domain=self._box(domain),
+        )
+
+    def _box(self, domain: OperatingDomain) -> dict[sp.Symbol, tuple[float, float]]:
+        if domain.joints != len(self.theta):
+            raise InputError("domain", "joints", domain.joints, str(len(self.theta)))
+        intervals = domain.angle_rad + domain.speed_rad_s
+        return dict(zip(self.theta + self.omega, intervals, strict=True))
+
+    def _over(
+        self, domain: OperatingDomain, expressions: Iterable[sp.Expr], first: int, kind: PremiseKind
+    ) -> tuple[Premise, ...]:
+        box = self._box(domain)
+        return tuple(
+            Premise.over(box, f"z{index}", expression, kind) for index, expression in enumerate(expressions, first)
+        )
+
+
+def _velocity_premises(
+    arm: PlanarSerialArm, theta: tuple[sp.Symbol, ...], omega: tuple[sp.Symbol, ...]
+) -> tuple[sp.Expr, ...]:
+    sin = sp.sin
+    if arm.coriolis_factorisation == "printed" and arm.joints == 2:
+        c2 = sp.Float(arm.inertia_constants[0, 1])
+        return (c2 * omega[1] * sin(theta[1]), -c2 * omega[0] * sin(theta[1]))
+    if arm.coriolis_factorisation == "printed":
+        (_, t2, t3), (w1, w2, w3) = theta, omega
+        tool = w1 + w2 + w3
+        return (
+            (2 * w1 + w2) * sin(t2),
+            w1 * sin(t2),
+            w1 * sin(t2 + t3),
+            (w1 + w2) * sin(t3),
+            tool * sin(t3),
+            tool * sin(t2 + t3),
+        )
+    n = len(theta)
+    pairs = [(k, k + gap) for gap in range(1, n) for k in range(n - gap)]
+    return tuple(sum(omega[: link + 1]) * sin(sum(theta[k + 1 : j + 1])) for k, j in pairs for link in (k, j))
+
+
+def _stiffness_premises(
+    arm: PlanarSerialArm, theta: tuple[sp.Symbol, ...], gravity: list[sp.Expr]
+) -> tuple[sp.Expr, ...]:
+    if all(g == 0 for g in gravity):
+        return ()
+    sincs = [sp.sinc(sum(theta[: k + 1])) for k in range(len(theta))]
+    if arm.coriolis_factorisation == "printed" and arm.joints == 2:
+        return (-gravity[0] * sincs[0] - gravity[1] * sincs[1], -gravity[1] * sincs[1])
+    return tuple(sincs)
