@@ -36,6 +36,14 @@ def sinc(x: Any) -> Any:
     return np.where(x == 0.0, 1.0, np.sin(safe) / safe)
 
 
+def integer_power(base: Any, exponent: int) -> Any:
+    """Return ``base**exponent`` for an exponent >= 1, multiplied out from the left as the run-time side does."""
+    power = base
+    for _ in range(exponent - 1):
+        power = power * base
+    return power
+
+
 @dataclass(frozen=True)
 class Operation:
     """One entry of the closed list: how many values it pops, which argument it carries, what it computes.
@@ -61,7 +69,7 @@ OPERATIONS: Mapping[str, Operation] = {
     "exp": Operation(1, None, np.exp),
     "sqrt": Operation(1, None, np.sqrt),
     "sinc": Operation(1, None, sinc),
-    "pow_int": Operation(1, "power", np.power),
+    "pow_int": Operation(1, "power", integer_power),
     "add": Operation(2, None, np.add),
     "sub": Operation(2, None, np.subtract),
     "mul": Operation(2, None, np.multiply),

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
+import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from quasilpv.artifact.canonical import Document, document_hash, with_hash
@@ -16,6 +18,7 @@ from quasilpv.artifact.programs import MAX_JOINTS, Program
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
 
 MAX_PREMISES = 32
+ROUNDING = 1e-12
 
 Vector = tuple[float, ...]
 Matrix = tuple[Vector, ...]
@@ -50,8 +53,8 @@ class Domain(StrictModel):
     def _check_intervals(self) -> Self:
         for field in ("angle_rad", "speed_rad_s"):
             for i, (lower, upper) in enumerate(getattr(self, field)):
-                if lower > upper:
-                    raise FieldError(f"{field}[{i}]", [lower, upper], "a lower bound not above the upper bound")
+                if not lower < upper:
+                    raise FieldError(f"{field}[{i}]", [lower, upper], "a lower bound below the upper bound")
         return self
 
 
@@ -106,16 +109,35 @@ class PolytopeTable(StrictModel):
             for j, vertex in enumerate(block.vertices):
                 yield f"blocks[{i}].vertices[{j}]", vertex
 
-    def require_symmetric(self, field: str, size: int) -> None:
-        """Raise ``FieldError`` unless every vertex is a symmetric ``size`` x ``size`` matrix."""
+    def at_centre(self) -> npt.NDArray[np.float64]:
+        """Return X at the centring point: the vertices of each block weighted with products of its premises' weights."""
+        matrix = np.zeros(np.shape(self.blocks[0].vertices[0]))
+        for block in self.blocks:
+            weights = np.ones(1)
+            for p in block.premises:
+                upper_weight = (self.centre[p] - self.lower[p]) / (self.upper[p] - self.lower[p])
+                weights = np.outer(weights, [1.0 - upper_weight, upper_weight]).ravel()
+            matrix += np.tensordot(weights, np.array(block.vertices), axes=1) / len(self.blocks)
+        return matrix
+
+    def require_inertia(self, field: str, size: int) -> None:
+        """Raise ``FieldError`` unless vertices are symmetric ``size`` x ``size`` and the centre is positive definite.
+
+        Corners of the box need not be configurations of the robot, so the vertices themselves may be indefinite.
+        """
         for path, vertex in self._vertices():
-            if len(vertex) != size or len(vertex[0]) != size:
+            matrix = np.array(vertex)
+            if matrix.shape != (size, size):
                 raise FieldError(f"{field}.{path}", f"{len(vertex)} x {len(vertex[0])}", f"{size} x {size}")
-            for i in range(size):
-                for j in range(i):
-                    if vertex[i][j] != vertex[j][i]:
-                        entry = f"{field}.{path}[{i}][{j}]"
-                        raise FieldError(entry, vertex[i][j], f"{vertex[j][i]}, the symmetric entry")
+            asymmetry = np.abs(matrix - matrix.T)
+            if asymmetry.max() > ROUNDING * np.abs(matrix).max():
+                i, j = np.unravel_index(int(asymmetry.argmax()), asymmetry.shape)
+                expected = f"{vertex[j][i]}, the symmetric entry"
+                raise FieldError(f"{field}.{path}[{i}][{j}]", vertex[i][j], expected)
+        eigenvalues = np.linalg.eigvalsh(self.at_centre())
+        smallest, largest = eigenvalues[0], np.abs(eigenvalues).max()
+        if not smallest > ROUNDING * largest:
+            raise FieldError(field, f"smallest eigenvalue {smallest:.3g} at the centre", "a positive definite inertia")
 
 
 class Feedback(StrictModel):
@@ -147,7 +169,7 @@ class PidLaw(StrictModel):
     kp: Vector
     kd: Vector
     ki: Vector
-    velocity_filter_time_constant_s: Positive
+    velocity_filter_time_constant_s: NonNegative
     inertia: PolytopeTable
 
 
@@ -155,7 +177,7 @@ class _ComputedTorque(StrictModel):
     gp: Vector
     gd: Vector
     gi: Vector
-    velocity_filter_time_constant_s: Positive
+    velocity_filter_time_constant_s: NonNegative
     disturbance_observer_bandwidth_rad_s: NonNegative
     inertia: PolytopeTable
 
@@ -263,7 +285,7 @@ class Artifact(StrictModel):
             require_size(field, getattr(getattr(self, section), member), n)
         for member in GAIN_FIELDS[self.law.kind]:
             require_size(f"law.{member}", getattr(self.law, member), n)
-        self.law.inertia.require_symmetric("law.inertia", n)
+        self.law.inertia.require_inertia("law.inertia", n)
         self._check_programs()
         return self
 

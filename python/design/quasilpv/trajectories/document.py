@@ -155,7 +155,7 @@ class Trajectory:
         for order, (name, factors) in enumerate(derivatives.items()):
             ends = sum(factors[i] * c[i] * h ** (i - order) for i in range(order, 6))
             starts = factors[order] * c[order]
-            scale = np.maximum(1.0, np.abs(starts).max(axis=0))
+            scale = np.maximum(1.0, np.maximum(np.abs(starts[1:]), np.abs(ends[:-1])))
             jumps = np.abs(starts[1:] - ends[:-1]) / scale
             if jumps.size and not jumps.max() <= CONTINUITY_TOLERANCE:
                 segment, joint = np.unravel_index(int(jumps.argmax()), jumps.shape)
