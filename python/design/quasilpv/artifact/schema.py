@@ -110,7 +110,7 @@ class PolytopeTable(StrictModel):
                 yield f"blocks[{i}].vertices[{j}]", vertex
 
     def at_centre(self) -> npt.NDArray[np.float64]:
-        """Return X at the centring point: the vertices of each block weighted with products of its premises' weights."""
+        """Return X at the centring point: vertices of a block weighted with products of its premises' weights."""
         matrix = np.zeros(np.shape(self.blocks[0].vertices[0]))
         for block in self.blocks:
             weights = np.ones(1)

@@ -1,0 +1,247 @@
+"""Scenarios: an experiment the simulator can run, true plant included (``docs/reference/formats.md``).
+
+The registry holds the tracking experiments of Dehak (2022, III.3.3 and IV.5.1): the tool of the 3-DoF arm follows a
+square or three quarters of a circle while sinusoidal torques (III.53) act on the joints, on the nominal arm or with the
+payload of chapter IV. Encoders have 20 bits; the measured speed, which only the baseline laws read, carries white
+noise.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from quasilpv.artifact.canonical import MAX_SAFE_INTEGER, Document, normalise, parse_strict_json
+from quasilpv.artifact.files import read_bytes, write_atomically
+from quasilpv.artifact.programs import MAX_JOINTS
+from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
+from quasilpv.errors import InputError
+from quasilpv.systems.arm_parameters import OperatingDomain
+from quasilpv.systems.registry import Robot
+from quasilpv.trajectories import Trajectory, serial_circle, serial_square
+from quasilpv.trajectories.planning import Kinematics
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Vector = tuple[float, ...]
+
+NOISE_SEED = 20220315
+"""Seed of the speed noise in every scenario of the registry: fixed, so that two runs see the same noise."""
+
+ENCODER_BITS = 20
+VELOCITY_NOISE_RAD_S = 0.05
+
+
+class LinkParameters(StrictModel):
+    """One link; the moment of inertia is about its joint axis."""
+
+    length_m: Positive
+    mass_kg: Positive
+    com_m: float
+    inertia_kg_m2: Positive
+    friction_nm_s: NonNegative
+
+    @model_validator(mode="after")
+    def _check_inertia(self) -> Self:
+        least = self.mass_kg * self.com_m**2
+        if self.inertia_kg_m2 < least * (1.0 - 1e-12):
+            expected = f"at least mass_kg * com_m^2 = {least:.6g}, being about the joint axis"
+            raise FieldError("inertia_kg_m2", self.inertia_kg_m2, expected)
+        return self
+
+
+class SerialArmPlant(StrictModel):
+    """A planar serial arm that hangs at theta = 0."""
+
+    kind: Literal["serial-arm"]
+    label: str
+    gravity_m_s2: float
+    links: Annotated[tuple[LinkParameters, ...], Field(min_length=1, max_length=MAX_JOINTS)]
+
+
+class IdaIntegrator(StrictModel):
+    """SUNDIALS IDA (variable-order BDF) with its error tolerances."""
+
+    kind: Literal["ida"] = "ida"
+    relative_tolerance: Positive = 1e-8
+    absolute_tolerance: Positive = 1e-10
+
+
+class Rk4Integrator(StrictModel):
+    """The classical Runge-Kutta method with equal steps."""
+
+    kind: Literal["rk4"] = "rk4"
+    steps_per_sample: int = Field(default=4, ge=1, le=1_000_000)
+
+
+class SineTorque(StrictModel):
+    """One term ``amplitude_nm * sin(frequency_rad_s * t + phase_rad)`` on one joint."""
+
+    joint: int = Field(ge=0)
+    amplitude_nm: float
+    frequency_rad_s: float
+    phase_rad: float = 0.0
+
+
+class Sensors(StrictModel):
+    """Encoder resolution (0 bits: exact), standard deviation of the speed noise, and its seed."""
+
+    encoder_bits: int = Field(default=ENCODER_BITS, ge=0, le=32)
+    velocity_noise_rad_s: NonNegative = VELOCITY_NOISE_RAD_S
+    seed: int = Field(default=NOISE_SEED, ge=0, le=MAX_SAFE_INTEGER)
+
+
+class InitialState(StrictModel):
+    """Joint angles and speeds of the plant at t = 0."""
+
+    angle_rad: Vector
+    speed_rad_s: Vector
+
+
+Integrator = Annotated[IdaIntegrator | Rk4Integrator, Field(discriminator="kind")]
+
+EXTERNAL_TORQUE = tuple(
+    SineTorque(joint=joint, amplitude_nm=amplitude, frequency_rad_s=15.0)
+    for joint, amplitude in enumerate((450.0, 375.0, 300.0))
+)
+"""The disturbance of Dehak 2022 (III.53): joint torques, added to the control torque as they are."""
+
+
+class Scenario(StrictModel):
+    """One experiment, immutable and consistent."""
+
+    schema_: Literal["quasilpv.scenario"] = Field(alias="schema")
+    schema_version: Literal[1]
+    name: Annotated[str, Field(min_length=1)]
+    duration_s: Positive
+    plant: SerialArmPlant
+    integrator: Integrator
+    external_torque: Annotated[tuple[SineTorque, ...], Field(max_length=1000)]
+    sensors: Sensors
+    transport_delay_s: NonNegative
+    initial: InitialState
+
+    @model_validator(mode="after")
+    def _check_joints(self) -> Self:
+        joints = len(self.plant.links)
+        for field in ("angle_rad", "speed_rad_s"):
+            if len(getattr(self.initial, field)) != joints:
+                raise FieldError(f"initial.{field}", f"{len(getattr(self.initial, field))} entries", str(joints))
+        for i, term in enumerate(self.external_torque):
+            if term.joint >= joints:
+                raise FieldError(f"external_torque[{i}].joint", term.joint, f"a joint index below {joints}")
+        return self
+
+    def to_document(self) -> Document:
+        """Return the scenario as a normalised JSON tree."""
+        document: Document = normalise(self.model_dump(mode="json", by_alias=True), self.name)
+        return document
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, object], source: str = "scenario") -> Scenario:
+        """Return the scenario of a JSON tree.
+
+        Raises:
+            InputError: a rule of the format is broken; the message names the field.
+        """
+        return validate(cls, document, source, tags=("ida", "rk4"))
+
+
+@dataclass(frozen=True)
+class TrackingTask:
+    """An entry of the registry: a robot by name and the reference it tracks."""
+
+    id: str
+    summary: str
+    robot: str
+    trajectory: Callable[[Kinematics, OperatingDomain | None], Trajectory]
+
+
+def tracking_tasks() -> tuple[TrackingTask, ...]:
+    """Return all tracking experiments, in a fixed order."""
+    return (
+        TrackingTask("serial-square", "the 3-DoF arm draws a square of 0.4 m in 3 s", "arm3", serial_square),
+        TrackingTask("serial-circle", "the 3-DoF arm draws 3/4 of a circle of 0.2 m in 3 s", "arm3", serial_circle),
+    )
+
+
+def tracking_task(name: str) -> TrackingTask:
+    """Return the tracking experiment of that name.
+
+    Raises:
+        InputError: there is none; the message lists those there are.
+    """
+    known = {task.id: task for task in tracking_tasks()}
+    if name not in known:
+        raise InputError("scenarios", "scenario", name, f"one of {', '.join(known)}")
+    return known[name]
+
+
+def build_scenario(
+    robot: Robot,
+    trajectory: Trajectory,
+    *,
+    plant: Literal["nominal", "perturbed"] = "perturbed",
+    sensors: Sensors | None = None,
+    integrator: IdaIntegrator | Rk4Integrator | None = None,
+    external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE,
+    transport_delay_s: float = 0.0,
+) -> Scenario:
+    """Return the experiment in which ``robot`` tracks ``trajectory``, starting on it.
+
+    Args:
+        robot: what the controller was designed for.
+        trajectory: the reference; gives the name, the duration and the state at t = 0.
+        plant: the true plant, the nominal robot or the robot with its full payload (moments of inertia about the
+            centres of mass unchanged).
+        sensors: default ``Sensors()``.
+        integrator: default ``IdaIntegrator()``.
+        external_torque: sines on the joints, default (III.53).
+        transport_delay_s: time from a sample to the moment its torque acts.
+
+    Raises:
+        InputError: robot and trajectory do not fit, or a value is out of range.
+    """
+    if robot.model.joints != trajectory.joints:
+        raise InputError(trajectory.name, "joints", trajectory.joints, f"{robot.model.joints}, as {robot.id} has")
+    arm = robot.with_payload_fraction(1.0 if plant == "perturbed" else 0.0)
+    start = trajectory.evaluate(0.0)
+    document = {
+        "schema": "quasilpv.scenario",
+        "schema_version": 1,
+        "name": trajectory.name,
+        "duration_s": trajectory.duration_s,
+        "plant": arm.plant_document(plant),
+        "integrator": (integrator or IdaIntegrator()).model_dump(mode="json"),
+        "external_torque": [term.model_dump(mode="json") for term in external_torque],
+        "sensors": (sensors or Sensors()).model_dump(mode="json"),
+        "transport_delay_s": transport_delay_s,
+        "initial": {"angle_rad": start.angle.tolist(), "speed_rad_s": start.speed.tolist()},
+    }
+    return Scenario.from_document(document, trajectory.name)
+
+
+def write_scenario(path: Path | str, scenario: Scenario) -> Path:
+    """Write a scenario file, indented for people.
+
+    Raises:
+        InputError: the file cannot be written; nothing half-written is left behind.
+    """
+    path = Path(path)
+    write_atomically({path: (json.dumps(scenario.to_document(), indent=2) + "\n").encode()})
+    return path
+
+
+def read_scenario(path: Path | str) -> Scenario:
+    """Read a scenario file.
+
+    Raises:
+        InputError: the file is missing, not strict JSON, or not a valid scenario.
+    """
+    source = str(path)
+    return Scenario.from_document(parse_strict_json(read_bytes(path), source), source)
