@@ -14,7 +14,8 @@ using Json = nlohmann::json;
 /// A number as RFC 8785 writes it (ECMAScript, shortest round trip). INIT-ONLY.
 std::string canonical_number(double value);
 
-/// RFC 8785 bytes of a document. INIT-ONLY. Throws InputError for NaN/Inf, non-ASCII keys, depth above 32.
+/// RFC 8785 bytes of a document; -0 is written as 0. INIT-ONLY. Throws InputError for NaN/Inf, non-ASCII keys, text
+/// that is not UTF-8, depth above 32.
 std::string canonical_json(const Json& document);
 
 /// Deterministic CBOR bytes (RFC 8949 section 4.2, integral numbers as integers). INIT-ONLY. Errors as canonical_json.
@@ -23,20 +24,24 @@ std::string canonical_cbor(const Json& document);
 /// Lower-case hexadecimal SHA-256. INIT-ONLY.
 std::string sha256_hex(std::string_view bytes);
 
-/// Parses a hashed document from the bytes of either twin (told apart by the first byte) and accepts it only if the bytes
-/// equal their canonical re-serialisation and the hash agrees. `source` names the file in errors. INIT-ONLY. Throws InputError.
+/// Parses a hashed document from the bytes of either twin (told apart by the first byte) and accepts it only if the
+/// bytes equal their canonical re-serialisation and the hash agrees. `source` names the file in errors. INIT-ONLY.
+/// Throws InputError.
 Json parse_document(std::string_view bytes, const std::string& source);
 
-/// Strict parse of unhashed JSON (scenario): refuses duplicate keys and anything JSON does not allow. INIT-ONLY. Throws InputError.
+/// Strict parse of unhashed JSON (scenario): refuses duplicate keys and anything JSON does not allow. INIT-ONLY. Throws
+/// InputError.
 Json parse_strict_json(std::string_view bytes, const std::string& source);
 
 /// Reads a whole file of at most 64 MiB. INIT-ONLY. Throws InputError if it cannot be read.
 std::string read_file(const std::string& path);
 
-/// A cursor into a parsed document that knows its path: every error names the field, what was found and what was expected.
+/// A cursor into a parsed document that knows its path: every error names the field, what was found and what was
+/// expected.
 class Field {
  public:
-  Field(const Json& value, std::string source, std::string path) : value_(&value), source_(std::move(source)), path_(std::move(path)) {}
+  Field(const Json& value, std::string source, std::string path)
+      : value_(&value), source_(std::move(source)), path_(std::move(path)) {}
 
   const Json& json() const { return *value_; }
   const std::string& path() const { return path_; }
@@ -51,9 +56,11 @@ class Field {
   bool has(const std::string& key) const;
   bool is_null() const;
 
-  std::size_t size() const;  ///< of an array
-  double number() const;     ///< finite
-  double positive() const;   ///< finite and > 0
+  std::size_t size() const;     ///< of an array
+  double number() const;        ///< finite
+  double positive() const;      ///< finite and > 0
+  double non_negative() const;  ///< finite and >= 0
+  bool boolean() const;
   std::int64_t integer(std::int64_t low, std::int64_t high) const;
   std::string text() const;
   std::vector<double> numbers(std::size_t expected_size) const;

@@ -36,7 +36,8 @@ enum StepFlag : std::uint32_t {
   kTorqueSaturated = 1u << 2,     ///< at least one joint at its torque limit
   kSlewLimited = 1u << 3,         ///< at least one joint at its slew limit
   kTorqueNotFinite = 1u << 4,     ///< the law produced NaN or Inf: the last torque was kept
-  kReferenceInvalid = 1u << 5     ///< NaN or Inf in the reference: the last valid reference was kept, at rest
+  kReferenceInvalid = 1u << 5,    ///< NaN or Inf in the reference: the last valid reference was kept, at rest
+  kModelInvalid = 1u << 6         ///< gravity not finite or design inertia not positive definite here
 };
 
 /// Result of one step. Disturbances of `dob-acceleration` are accelerations (rad/s^2), of the other laws torques (N m).
@@ -49,7 +50,7 @@ struct StepReport {
   JointArray estimated_speed{};
   JointArray estimated_disturbance{};
   JointArray filtered_disturbance{};
-  JointArray integral_error{};  ///< rad s, the value used in this step
+  JointArray integral_error{};                 ///< rad s, the value used in this step
   std::array<double, kMaxPremises> premise{};  ///< after clamping
 };
 

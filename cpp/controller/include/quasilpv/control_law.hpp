@@ -1,0 +1,46 @@
+// The one interface of all control laws, and the factory that binds an artifact to its law.
+#pragma once
+
+#include <memory>
+
+#include "quasilpv/artifact.hpp"
+#include "quasilpv/step.hpp"
+
+namespace quasilpv {
+
+/// A law with its state, for a number of joints fixed at compile time.
+class ControlLaw {
+ public:
+  virtual ~ControlLaw() = default;
+  ControlLaw(const ControlLaw&) = delete;
+  ControlLaw& operator=(const ControlLaw&) = delete;
+
+  /// One sample. Until the first valid measurement there is nothing to control with: the torque is zero and the flag
+  /// kMeasurementInvalid is set. RT-SAFE (bounded, no allocation, no lock, no throw).
+  virtual StepReport step(const StepInput& input) noexcept = 0;
+
+  /// Forgets all state. RT-SAFE (bounded, no allocation, no lock, no throw).
+  virtual void reset() noexcept = 0;
+
+ protected:
+  ControlLaw() = default;
+};
+
+/// What a law needs from the artifact besides its own parameters.
+struct LawSettings {
+  double sample_period_s = 0.0;
+  int joints = 0;
+  TorqueLimits limits;
+};
+
+/// Law of Dehak 2022, chapter IV, in acceleration coordinates and discrete time. INIT-ONLY.
+std::unique_ptr<ControlLaw> make_law(const DobAccelerationParameters& parameters, const LawSettings& settings);
+/// PID with feedforward, Dehak 2022 (III.54). INIT-ONLY.
+std::unique_ptr<ControlLaw> make_law(const PidParameters& parameters, const LawSettings& settings);
+/// Computed torque with and without disturbance observer, Dehak 2022 (III.56). INIT-ONLY.
+std::unique_ptr<ControlLaw> make_law(const ComputedTorqueParameters& parameters, const LawSettings& settings);
+
+/// Dispatches once on the kind and the number of joints. INIT-ONLY.
+std::unique_ptr<ControlLaw> make_law(const Artifact& artifact);
+
+}  // namespace quasilpv

@@ -1,0 +1,202 @@
+#include "quasilpv/artifact.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "quasilpv/document.hpp"
+
+namespace quasilpv {
+namespace {
+
+constexpr double kSymmetryTolerance = 1e-12;      // relative to the largest entry
+constexpr double kDefinitenessTolerance = 1e-12;  // smallest over largest eigenvalue
+
+void expect_object_or_null(const Field& field) {
+  if (!field.json().is_object() && !field.is_null()) {
+    field.fail("another type", "an object or null");
+  }
+}
+
+void expect_object(const Field& field) {
+  if (!field.json().is_object()) {
+    field.fail("another type", "an object");
+  }
+}
+
+std::string hex_digits(const Field& field, std::size_t count) {
+  const std::string text = field.text();
+  const bool is_hex = text.find_first_not_of("0123456789abcdef") == std::string::npos;
+  if (text.size() != count || !is_hex) {
+    field.fail(std::to_string(text.size()) + " characters", std::to_string(count) + " lower-case hexadecimal digits");
+  }
+  return text;
+}
+
+JointArray joint_values(const Field& field, int joints, double (Field::*read)() const) {
+  if (field.size() != static_cast<std::size_t>(joints)) {
+    field.fail("an array of " + std::to_string(field.size()), std::to_string(joints) + " values, one per joint");
+  }
+  JointArray values{};
+  for (std::size_t j = 0; j < field.size(); ++j) {
+    values[j] = (field.at(j).*read)();
+  }
+  return values;
+}
+
+std::array<Interval, kMaxJoints> intervals(const Field& field, int joints) {
+  if (field.size() != static_cast<std::size_t>(joints)) {
+    field.fail("an array of " + std::to_string(field.size()), std::to_string(joints) + " intervals, one per joint");
+  }
+  std::array<Interval, kMaxJoints> result{};
+  for (std::size_t j = 0; j < field.size(); ++j) {
+    const std::vector<double> bounds = field.at(j).numbers(2);
+    if (bounds[0] >= bounds[1]) {
+      field.at(j).fail("[" + canonical_number(bounds[0]) + ", " + canonical_number(bounds[1]) + "]",
+                       "a lower bound below the upper bound");
+    }
+    result[j] = {bounds[0], bounds[1]};
+  }
+  return result;
+}
+
+// Only the centre is tested for definiteness: premises depend on each other, so a corner of the box need not be a
+// configuration of the robot, and the design inertia may rightly be indefinite there.
+BlockPolytope parse_inertia(const Field& field, int joints) {
+  BlockPolytope inertia = BlockPolytope::parse(field, joints, joints);
+  for (int i = 0; i < inertia.vertices(); ++i) {
+    const Eigen::MatrixXd& vertex = inertia.vertex(i);
+    const double asymmetry = (vertex - vertex.transpose()).cwiseAbs().maxCoeff();
+    if (!(asymmetry <= kSymmetryTolerance * vertex.cwiseAbs().maxCoeff())) {
+      field["blocks"].fail("vertex " + std::to_string(i) + " with asymmetry " + Json(asymmetry).dump(),
+                           "symmetric vertices");
+    }
+  }
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(inertia.at_centre(), Eigen::EigenvaluesOnly).eigenvalues();
+  const double smallest = eigenvalues.minCoeff();
+  if (!(smallest > kDefinitenessTolerance * eigenvalues.cwiseAbs().maxCoeff())) {
+    field.fail("smallest eigenvalue " + Json(smallest).dump() + " at the centre of the box",
+               "a positive definite inertia");
+  }
+  return inertia;
+}
+
+DesignModel parse_model(const Field& law, const Field& programs, int joints) {
+  BlockPolytope inertia = parse_inertia(law["inertia"], joints);
+  const ProgramScope scope{joints, false, false};
+  Program premises = Program::parse(programs["premises"], scope, inertia.premises());
+  Program gravity = Program::parse(programs["gravity"], scope, joints);
+  return {std::move(premises), std::move(inertia), std::move(gravity)};
+}
+
+DobAccelerationParameters parse_dob_acceleration(const Field& law, const Field& programs, int joints) {
+  programs.only({"premises", "gravity"});
+  law.only({"kind", "feedback", "observer", "filter_time_constant_s", "disturbance_compensation", "inertia"});
+  const Field feedback = law["feedback"];
+  feedback.only({"kp", "kd", "ki"});
+  DobAccelerationParameters parameters{parse_model(law, programs, joints)};
+  parameters.kp = feedback["kp"].number();
+  parameters.kd = feedback["kd"].number();
+  parameters.ki = feedback["ki"].number();
+  const std::vector<double> observer = law["observer"].numbers(parameters.observer.size());
+  std::copy(observer.begin(), observer.end(), parameters.observer.begin());
+  parameters.filter_time_constant_s = law["filter_time_constant_s"].positive();
+  parameters.disturbance_compensation = law["disturbance_compensation"].boolean();
+  return parameters;
+}
+
+PidParameters parse_pid(const Field& law, const Field& programs, int joints) {
+  programs.only({"premises", "gravity", "coriolis_reference"});
+  law.only({"kind", "kp", "kd", "ki", "velocity_filter_time_constant_s", "inertia"});
+  PidParameters parameters{parse_model(law, programs, joints),
+                           Program::parse(programs["coriolis_reference"], {joints, true, true}, joints)};
+  parameters.kp = joint_values(law["kp"], joints, &Field::number);
+  parameters.kd = joint_values(law["kd"], joints, &Field::number);
+  parameters.ki = joint_values(law["ki"], joints, &Field::number);
+  parameters.velocity_filter_time_constant_s = law["velocity_filter_time_constant_s"].non_negative();
+  return parameters;
+}
+
+ComputedTorqueParameters parse_computed_torque(const Field& law, const Field& programs, int joints) {
+  programs.only({"premises", "gravity", "coriolis"});
+  law.only(
+      {"kind", "gp", "gd", "gi", "velocity_filter_time_constant_s", "disturbance_observer_bandwidth_rad_s", "inertia"});
+  ComputedTorqueParameters parameters{parse_model(law, programs, joints),
+                                      Program::parse(programs["coriolis"], {joints, true, false}, joints)};
+  parameters.gp = joint_values(law["gp"], joints, &Field::number);
+  parameters.gd = joint_values(law["gd"], joints, &Field::number);
+  parameters.gi = joint_values(law["gi"], joints, &Field::number);
+  parameters.velocity_filter_time_constant_s = law["velocity_filter_time_constant_s"].non_negative();
+  const Field bandwidth = law["disturbance_observer_bandwidth_rad_s"];
+  parameters.disturbance_observer_bandwidth_rad_s = bandwidth.non_negative();
+  const bool has_observer = parameters.disturbance_observer_bandwidth_rad_s > 0.0;
+  if (has_observer != (law["kind"].text() == "ctc-dob")) {
+    bandwidth.fail(canonical_number(bandwidth.number()), "0 for kind ctc, above 0 for kind ctc-dob");
+  }
+  return parameters;
+}
+
+}  // namespace
+
+Artifact Artifact::load(const std::string& path) { return parse(read_file(path), path); }
+
+Artifact Artifact::parse(std::string_view bytes, const std::string& source) {
+  const Json document = parse_document(bytes, source);
+  const Field root(document, source, "");
+  Artifact artifact;
+  artifact.parse_header(root);
+  artifact.parse_limits(root);
+  artifact.parse_law(root["law"], root["programs"]);
+  return artifact;
+}
+
+void Artifact::parse_header(const Field& root) {
+  root["schema"].expect_text("quasilpv.artifact");
+  root["schema_version"].integer(1, 1);
+  root.only({"schema", "schema_version", "hash", "name", "creator", "design_hash", "units", "sample_period_s", "joints",
+             "robot", "payloads", "domain", "limits", "programs", "law", "witness", "verification"});
+  hash_ = root["hash"].text();
+  hash_prefix_ = static_cast<std::int64_t>(std::stoull(hash_.substr(0, 16), nullptr, 16));
+  name_ = root["name"].text();
+  const Field creator = root["creator"];
+  creator.only({"tool", "version"});
+  (void)creator["tool"].text();
+  (void)creator["version"].text();
+  design_hash_ = hex_digits(root["design_hash"], 64);
+  root["units"].expect_text("SI");
+  sample_period_s_ = root["sample_period_s"].positive();
+  joints_ = static_cast<int>(root["joints"].integer(1, kMaxJoints));
+  const Field robot = root["robot"];
+  robot.only({"id", "parameters"});
+  robot_id_ = robot["id"].text();
+  expect_object(robot["parameters"]);
+  expect_object(root["payloads"]);
+  expect_object_or_null(root["witness"]);
+  expect_object_or_null(root["verification"]);
+}
+
+void Artifact::parse_limits(const Field& root) {
+  const Field domain = root["domain"];
+  domain.only({"angle_rad", "speed_rad_s"});
+  domain_.angle_rad = intervals(domain["angle_rad"], joints_);
+  domain_.speed_rad_s = intervals(domain["speed_rad_s"], joints_);
+  const Field limits = root["limits"];
+  limits.only({"torque_nm", "slew_nm_per_s"});
+  limits_.torque_nm = joint_values(limits["torque_nm"], joints_, &Field::positive);
+  limits_.slew_nm_per_s = joint_values(limits["slew_nm_per_s"], joints_, &Field::positive);
+}
+
+void Artifact::parse_law(const Field& law, const Field& programs) {
+  law_kind_ = law["kind"].text();
+  if (law_kind_ == "dob-acceleration") {
+    law_ = parse_dob_acceleration(law, programs, joints_);
+  } else if (law_kind_ == "pid") {
+    law_ = parse_pid(law, programs, joints_);
+  } else if (law_kind_ == "ctc" || law_kind_ == "ctc-dob") {
+    law_ = parse_computed_torque(law, programs, joints_);
+  } else {
+    law["kind"].fail(Json(law_kind_).dump(), "dob-acceleration, pid, ctc or ctc-dob");
+  }
+}
+
+}  // namespace quasilpv

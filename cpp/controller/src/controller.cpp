@@ -1,0 +1,27 @@
+#include "quasilpv/controller.hpp"
+
+#include "quasilpv/control_law.hpp"
+
+namespace quasilpv {
+
+std::unique_ptr<ControlLaw> make_law(const Artifact& artifact) {
+  const LawSettings settings{artifact.sample_period_s(), artifact.joints(), artifact.limits()};
+  return std::visit([&settings](const auto& parameters) { return make_law(parameters, settings); }, artifact.law());
+}
+
+Controller::Controller(const Artifact& artifact)
+    : law_(make_law(artifact)), sample_period_s_(artifact.sample_period_s()), joints_(artifact.joints()) {}
+
+Controller::~Controller() = default;
+Controller::Controller(Controller&&) noexcept = default;
+Controller& Controller::operator=(Controller&&) noexcept = default;
+
+StepReport Controller::step(const StepInput& input) noexcept { return law_->step(input); }
+
+void Controller::reset() noexcept { law_->reset(); }
+
+int Controller::joints() const noexcept { return joints_; }
+
+double Controller::sample_period_s() const noexcept { return sample_period_s_; }
+
+}  // namespace quasilpv
