@@ -48,7 +48,3 @@ class FaultStop(QuasilpvError):  # noqa: N818 -- the machine's word: a stop, not
 
 class InfeasibleError(QuasilpvError):
     """A specification cannot be met: no design exists in the family that was searched (exit code 1)."""
-
-
-class PlantError(QuasilpvError):
-    """The plant could not be integrated or reached a configuration where it is not defined (exit code 6)."""

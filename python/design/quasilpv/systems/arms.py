@@ -311,5 +311,5 @@ class PlanarSerialArm:
 
 
 def _relative(absolute: Matrix) -> Matrix:
-    """A form in absolute speeds written in relative ones: S^T X S, entry (i, j) sums rows >= i and columns >= j of X."""
+    """A form in absolute speeds written in relative ones, S^T X S: entry (i, j) sums X over rows >= i, columns >= j."""
     return np.cumsum(np.cumsum(absolute[::-1, ::-1], axis=0), axis=1)[::-1, ::-1].copy()

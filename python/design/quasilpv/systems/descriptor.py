@@ -83,8 +83,8 @@ class DescriptorSystem:
         """Find the coefficients of matrices that are affine in the given premises.
 
         Raises:
-            InputError: an entry is not ``a_0 + sum a_k z_k(x)`` with numbers a_k (entry and remainder are named), or the
-                premises are linearly dependent (with each other or with a constant).
+            InputError: an entry is not ``a_0 + sum a_k z_k(x)`` with numbers a_k (entry and remainder are named), or
+                the premises are linearly dependent (with each other or with a constant).
         """
         basis = _PremiseBasis(name, premises)
         return cls(

@@ -24,7 +24,7 @@ from mpmath.ctx_iv import MPIntervalContext
 from quasilpv.errors import InputError
 
 _PRECISION_BITS = 80
-_MAX_BOXES = 20_000
+_MAX_BOXES = 2_000  # reached only if the extremum is not isolated
 _iv = MPIntervalContext()
 _iv.prec = _PRECISION_BITS
 
@@ -67,7 +67,7 @@ def enclose(
         return _lower(whole), _upper(whole)
     minimum = _lower_bound_of_minimum(function, box, tolerance)
     maximum = -_lower_bound_of_minimum(_IntervalFunction(-expression, symbols), box, tolerance)
-    return max(minimum, _lower(whole)), min(maximum, _upper(whole))
+    return max(minimum, _lower(whole)) + 0.0, min(maximum, _upper(whole)) + 0.0
 
 
 def _every_symbol_occurs_once(expression: sp.Expr) -> bool:
