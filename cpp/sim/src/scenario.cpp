@@ -14,14 +14,6 @@ constexpr std::int64_t kMaxSeed = 9007199254740991;  // 2^53 - 1, the largest in
 constexpr int kMaxStepsPerSample = 1000000;
 constexpr std::size_t kMaxSines = 1000;
 
-double not_negative(const Field& field) {
-  const double value = field.number();
-  if (value < 0.0) {
-    field.fail(field.json().dump(), "a number >= 0");
-  }
-  return value;
-}
-
 JointArray joint_array(const Field& field, int joints) {
   const std::vector<double> values = field.numbers(static_cast<std::size_t>(joints));
   JointArray array{};
@@ -84,7 +76,7 @@ SensorOptions sensors(const Field& field) {
   field.only({"encoder_bits", "velocity_noise_rad_s", "seed"});
   SensorOptions options;
   options.encoder_bits = static_cast<int>(field["encoder_bits"].integer(0, kMaxEncoderBits));
-  options.velocity_noise_rad_s = not_negative(field["velocity_noise_rad_s"]);
+  options.velocity_noise_rad_s = field["velocity_noise_rad_s"].non_negative();
   options.seed = static_cast<std::uint64_t>(field["seed"].integer(0, kMaxSeed));
   return options;
 }
@@ -111,7 +103,7 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
   scenario.integrator = quasilpv::integrator(root["integrator"]);
   scenario.external_torque = quasilpv::external_torque(root["external_torque"], n);
   scenario.sensors = quasilpv::sensors(root["sensors"]);
-  scenario.transport_delay_s = not_negative(root["transport_delay_s"]);
+  scenario.transport_delay_s = root["transport_delay_s"].non_negative();
   const Field initial = root["initial"];
   initial.only({"angle_rad", "speed_rad_s"});
   scenario.initial_angle = joint_array(initial["angle_rad"], n);
