@@ -186,7 +186,8 @@ def compile_program(expressions: Sequence[sympy.Expr], inputs: Mapping[sympy.Sym
     """Compile sympy expressions to one program with ``len(expressions)`` outputs.
 
     Sums and products are evaluated from left to right in sympy's canonical sort order, so that equal expressions give
-    equal code on every machine. ``sympy.sinc`` is sin(x)/x, as in the programs.
+    equal code on every machine. ``sympy.sinc`` is sin(x)/x, as in the programs; tan and atan are written with the
+    operations there are.
 
     Args:
         expressions: real expressions in the keys of ``inputs``.
@@ -240,6 +241,13 @@ class _Compiler:
             for argument in node.args:
                 self.emit(argument)
             self._code.append((self._FUNCTIONS[node.func],))
+        elif node.func is sympy.tan:
+            self.emit(sympy.sin(node.args[0]))
+            self.emit(sympy.cos(node.args[0]))
+            self._code.append(("div",))
+        elif node.func is sympy.atan:
+            self.emit(node.args[0])
+            self._code.extend([("const", 1.0), ("atan2",)])
         else:
             known = map(str, self._inputs) if node.is_Symbol else OPERATIONS
             raise InputError("program", self._field, node, f"one of {', '.join(known)}")
