@@ -21,7 +21,7 @@ LAYERS = (
     {"synthesis"},
     {"certificate"},
     {"artifact"},
-    {"trajectories", "scenarios", "_runtime"},
+    {"trajectories", "scenarios", "_runtime", "release"},
     {"experiments"},
     {"figures"},
     {"cli"},

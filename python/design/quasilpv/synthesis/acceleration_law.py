@@ -1,0 +1,73 @@
+"""The default tracking law `dob-acceleration`, from robot and specification to a design with its witness."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from quasilpv.conditions.sampled_chains import ChainGains
+from quasilpv.synthesis.acceleration_design import AccelerationDesign, Progress, design_acceleration_law, no_progress
+from quasilpv.synthesis.specification import Specification
+from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
+from quasilpv.systems.registry import Robot
+
+
+def acceleration_law(
+    robot: Robot,
+    specification: Specification,
+    progress: Progress = no_progress,
+    disturbance_compensation: bool = True,
+) -> TrackingDesign:
+    """Design `dob-acceleration`.
+
+    Args:
+        robot: what it is for.
+        specification: what is asked for.
+        progress: called with (points done, points in all).
+        disturbance_compensation: False leaves the observed disturbance out of the torque (to show what it is worth).
+
+    Raises:
+        InfeasibleError: no design meets the specification.
+    """
+    design = design_acceleration_law(robot, specification, progress)
+    scalars = design.candidate.law
+    kp, kd, ki = (float(gain) for gain in scalars.feedback)
+    law = {
+        "kind": "dob-acceleration",
+        "feedback": {"kp": kp, "kd": kd, "ki": ki},
+        "observer": [float(gain) for gain in scalars.observer],
+        "filter_time_constant_s": scalars.filter_time_constant_s,
+        "disturbance_compensation": disturbance_compensation,
+        "inertia": inertia_table(robot, design.candidate.inertia_scale),
+    }
+    return TrackingDesign(
+        controller="dob-acceleration",
+        robot=robot,
+        sample_period_s=specification.sample_period_s,
+        law=law,
+        expressions=premise_and_gravity(robot),
+        inputs={
+            "controller": "dob-acceleration",
+            "specification": specification.to_document(),
+            "disturbance_compensation": disturbance_compensation,
+        },
+        report=design.report(),
+        witness=_witness(design),
+    )
+
+
+def _witness(design: AccelerationDesign) -> dict[str, Any]:
+    """The points of the two conditions, in their own time unit, and the bandwidths that fix their data."""
+    wc, wo = design.candidate.bandwidths
+    return {
+        "feedback": {"condition": "sampled-feedback", "bandwidth_rad_s": wc, **_point(design.feedback, "P")},
+        "observer": {"condition": "sampled-observer", "bandwidth_rad_s": wo, **_point(design.observer, "Q")},
+    }
+
+
+def _point(chain: ChainGains, name: str) -> dict[str, Any]:
+    return {
+        name: chain.lyapunov.tolist(),
+        "disk_centre": chain.disk[0],
+        "disk_radius": chain.disk[1],
+        "objective": chain.objective,
+    }

@@ -1,0 +1,64 @@
+"""Which inertia ratios a robust design must tolerate: ``M_t / M_n`` over configurations and payloads."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from quasilpv.systems.registry import Robot
+
+CONFIGURATIONS = 2000
+PAYLOAD_FRACTIONS = 9
+
+
+@dataclass(frozen=True)
+class InertiaRange:
+    """Smallest and largest eigenvalue of ``M_n^-1 M_t`` and where they occur (joint angles, payload fraction)."""
+
+    lowest: float
+    highest: float
+    where_lowest: tuple[tuple[float, ...], float]
+    where_highest: tuple[tuple[float, ...], float]
+
+
+def configurations(robot: Robot, count: int = CONFIGURATIONS) -> npt.NDArray[np.float64]:
+    """Grid of about ``count`` configurations of the operating domain, bounds included, shape (N, n).
+
+    The inertia of a serial chain does not depend on its first joint, which stays at the middle of its interval.
+    """
+    intervals = robot.domain.angle_rad
+    per_joint = max(3, round(count ** (1.0 / max(1, len(intervals) - 1))))
+    first = np.array([sum(intervals[0]) / 2.0])
+    axes = [first, *(np.linspace(low, high, per_joint) for low, high in intervals[1:])]
+    return np.array(list(itertools.product(*axes)))
+
+
+def needed_inertia_range(robot: Robot, count: int = CONFIGURATIONS) -> InertiaRange:
+    """Range of ``M_t / M_n`` for M_n the nominal inertia, over a grid of reachable configurations and payloads.
+
+    Reachable configurations, not corners of the premise box: the cosines are dependent, and at some corners the inertia
+    is not even positive definite. A grid, so a numerical range: the proof is the business of the certificate.
+    """
+    postures = configurations(robot, count)
+    factor = np.linalg.cholesky(np.array([robot.model.inertia(theta) for theta in postures]))
+    found: list[tuple[float, float, int, int, float]] = []
+    for fraction in np.linspace(0.0, 1.0, PAYLOAD_FRACTIONS):
+        plant = robot.with_payload_fraction(float(fraction))
+        inertia = np.array([plant.inertia(theta) for theta in postures])
+        half = np.linalg.solve(factor, inertia)
+        ratios = np.linalg.eigvalsh(np.linalg.solve(factor, half.transpose(0, 2, 1)))  # of L^-1 M_t L^-T
+        at_low, at_high = int(np.argmin(ratios[:, 0])), int(np.argmax(ratios[:, -1]))
+        found.append((ratios[at_low, 0], ratios[at_high, -1], at_low, at_high, float(fraction)))
+    low = min(found, key=lambda entry: entry[0])
+    high = max(found, key=lambda entry: entry[1])
+    return InertiaRange(
+        float(low[0]), float(high[1]), (tuple(postures[low[2]]), low[4]), (tuple(postures[high[3]]), high[4])
+    )
+
+
+def largest_inertia_norm(robot: Robot) -> float:
+    """Largest Frobenius norm of the nominal inertia over the operating domain, kg m^2."""
+    return max(float(np.linalg.norm(robot.model.inertia(theta))) for theta in configurations(robot, 200))
