@@ -1,0 +1,209 @@
+"""One sample of every control law, from the formulas.
+
+n joints, T the sample period, y and w_y the measured angles and speeds, (r, r', r'') the reference, M and G the design inertia and
+gravity at y. Every law ends in the same output stage: saturate, then limit the change against the last torque (the first torque
+has none), and the integral of joint j is frozen while the limits cut off what its integral action is pushing towards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+Model = Callable[[FloatArray], FloatArray]
+SpeedModel = Callable[[FloatArray, FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Input of one step."""
+
+    angle: FloatArray
+    speed: FloatArray
+    reference_angle: FloatArray
+    reference_speed: FloatArray
+    reference_acceleration: FloatArray
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Output of one step; ``summands`` are the terms of the torque, whose largest magnitude scales tolerances."""
+
+    torque_commanded: FloatArray
+    torque_applied: FloatArray
+    estimated_disturbance: FloatArray
+    summands: tuple[FloatArray, ...]
+
+    @property
+    def scale(self) -> float:
+        return max(float(np.max(np.abs(term))) for term in self.summands)
+
+
+@dataclass
+class OutputStage:
+    """gamma = clip(clip(u, +-limit), last +- slew T)."""
+
+    torque_nm: FloatArray
+    slew_nm_per_s: FloatArray
+    T: float
+    last: FloatArray | None = None
+
+    def apply(self, torque: FloatArray) -> FloatArray:
+        limited = np.clip(torque, -self.torque_nm, self.torque_nm)
+        if self.last is not None:
+            change = self.slew_nm_per_s * self.T
+            limited = np.clip(limited, self.last - change, self.last + change)
+        self.last = limited
+        return limited
+
+
+def integrate(
+    integral: FloatArray, error: FloatArray, gain: FloatArray, T: float, commanded: FloatArray, applied: FloatArray
+) -> FloatArray:
+    """e_I + T e, except where the limits cut off torque in the direction of gain * e."""
+    winds_up = (commanded - applied) * gain * error > 0.0
+    return np.where(winds_up, integral, integral + T * error)
+
+
+@dataclass
+class DobAcceleration:
+    """Feedback, disturbance observer and exact prediction, all in acceleration coordinates."""
+
+    kp: float
+    kd: float
+    ki: float
+    observer: tuple[float, float, float, float]
+    T_f: float
+    inertia: Model
+    gravity: Model
+    output: OutputStage
+    compensate: bool = True
+    x: list[FloatArray] = field(default_factory=list)
+
+    def step(self, s: Sample) -> Answer:
+        T, (l1, l2, l3, l4), y = self.output.T, self.observer, s.angle
+        if not self.x:
+            self.x = [y.copy(), *(np.zeros_like(y) for _ in range(5))]
+        th, w, a_d, j_d, d_f, e_I = self.x
+        innovation = y - th
+        th, w = th + l1 * innovation, w + l2 * innovation
+        a_d, j_d = a_d + l3 * innovation, j_d + l4 * innovation
+        q = np.exp(-T / self.T_f)
+        d_f = q * d_f + (1.0 - q) * a_d
+        M, G = self.inertia(y), self.gravity(y)
+        terms = [
+            s.reference_acceleration,
+            -d_f if self.compensate else np.zeros_like(d_f),
+            self.kp * (th - s.reference_angle),
+            self.kd * (w - s.reference_speed),
+            self.ki * e_I,
+        ]
+        commanded = M @ np.asarray(sum(terms)) + G
+        applied = self.output.apply(commanded)
+        estimate = a_d
+        e_I = integrate(e_I, y - s.reference_angle, np.full_like(y, self.ki), T, commanded, applied)
+        a = np.linalg.solve(M, applied - G) + a_d
+        th = th + T * w + T**2 / 2 * a + T**3 / 6 * j_d
+        w = w + T * a + T**2 / 2 * j_d
+        self.x = [th, w, a_d + T * j_d, j_d, d_f, e_I]
+        summands = (*(np.abs(M) @ np.abs(term) for term in terms), np.abs(M) @ np.abs(l3 * innovation), G)
+        return Answer(commanded, applied, estimate, summands)
+
+
+@dataclass
+class SpeedFilter:
+    """First-order low-pass filter of the measured speed, w <- q w + (1 - q) w_y, q = exp(-T/T_f), from the first sample."""
+
+    q: float
+    w: FloatArray | None = None
+
+    def apply(self, measured: FloatArray) -> FloatArray:
+        self.w = measured if self.w is None else self.q * self.w + (1.0 - self.q) * measured
+        return self.w
+
+
+@dataclass
+class Pid:
+    """u = kp e + kd (r' - w) + ki int e + M r'' + N(y, w) r' + G with e = r - y (Dehak 2022, III.54)."""
+
+    kp: FloatArray
+    kd: FloatArray
+    ki: FloatArray
+    inertia: Model
+    coriolis_reference: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+    gravity: Model
+    speed_filter: SpeedFilter
+    output: OutputStage
+    integral: FloatArray | None = None
+
+    def step(self, s: Sample) -> Answer:
+        w = self.speed_filter.apply(s.speed)
+        integral = np.zeros_like(w) if self.integral is None else self.integral
+        error = s.reference_angle - s.angle
+        summands = (
+            self.kp * error,
+            self.kd * (s.reference_speed - w),
+            self.ki * integral,
+            self.inertia(s.angle) @ s.reference_acceleration,
+            self.coriolis_reference(s.angle, w, s.reference_speed),
+            self.gravity(s.angle),
+        )
+        commanded = np.asarray(sum(summands))
+        applied = self.output.apply(commanded)
+        self.integral = integrate(integral, error, self.ki, self.output.T, commanded, applied)
+        return Answer(commanded, applied, np.zeros_like(w), summands)
+
+
+@dataclass
+class ComputedTorque:
+    """u = M (r'' + gp e + gd (r' - w) + gi int e - a_hat) + N(y, w) w + G with e = r - y (Dehak 2022, III.56, sign corrected).
+
+    The disturbance observer of bandwidth c compares the speed reached with the speed the model predicts over one sample:
+    a_hat+ = q a_hat + (1 - q) ((w+ - w)/T - M^-1 (gamma_applied - N w - G)), q = exp(-c T), from a_hat = 0.
+    """
+
+    gp: FloatArray
+    gd: FloatArray
+    gi: FloatArray
+    bandwidth: float
+    inertia: Model
+    coriolis: SpeedModel
+    gravity: Model
+    speed_filter: SpeedFilter
+    output: OutputStage
+    integral: FloatArray | None = None
+    a_hat: FloatArray | None = None
+    before: tuple[FloatArray, FloatArray] | None = None
+
+    def step(self, s: Sample) -> Answer:
+        T = self.output.T
+        w = self.speed_filter.apply(s.speed)
+        integral = np.zeros_like(w) if self.integral is None else self.integral
+        a_hat = self._observe(w)
+        error = s.reference_angle - s.angle
+        M, bias = self.inertia(s.angle), self.coriolis(s.angle, w) + self.gravity(s.angle)
+        terms = [
+            s.reference_acceleration,
+            self.gp * error,
+            self.gd * (s.reference_speed - w),
+            self.gi * integral,
+            -a_hat,
+        ]
+        commanded = M @ np.asarray(sum(terms)) + bias
+        applied = self.output.apply(commanded)
+        self.integral = integrate(integral, error, self.gi, T, commanded, applied)
+        self.a_hat, self.before = a_hat, (w, np.linalg.solve(M, applied - bias))
+        summands = (*(np.abs(M) @ np.abs(term) for term in terms), bias)
+        return Answer(commanded, applied, M @ a_hat, summands)
+
+    def _observe(self, w: FloatArray) -> FloatArray:
+        if self.a_hat is None or self.before is None:
+            return np.zeros_like(w)
+        w_before, predicted = self.before
+        q = np.exp(-self.bandwidth * self.output.T)
+        reached = (w - w_before) / self.output.T
+        return np.asarray(q * self.a_hat + (1.0 - q) * (reached - predicted))

@@ -1,0 +1,192 @@
+"""One control step in C++ against the same step in numpy, law by law, on 1000 random inputs each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from reference.random_arms import SAMPLE_PERIOD_S, artifact_bytes, random_arm
+from reference.serial_arm import SerialArm
+from reference.step import (
+    Answer,
+    ComputedTorque,
+    DobAcceleration,
+    FloatArray,
+    OutputStage,
+    Pid,
+    Sample,
+    SpeedFilter,
+)
+
+from quasilpv import _runtime
+from quasilpv.errors import InputError
+
+RELATIVE_TOLERANCE = 1e-12  # of the largest summand: observer gains make single summands large
+RUNS, STEPS_PER_RUN = 200, 5
+FILTER_S = 2e-3
+
+Reference = DobAcceleration | Pid | ComputedTorque
+Builder = Callable[[SerialArm, np.random.Generator, OutputStage], tuple[dict[str, Any], Callable[[], Reference]]]
+
+
+def fresh(output: OutputStage) -> OutputStage:
+    return OutputStage(output.torque_nm, output.slew_nm_per_s, output.T)
+
+
+def speed_filter() -> SpeedFilter:
+    return SpeedFilter(float(np.exp(-SAMPLE_PERIOD_S / FILTER_S)))
+
+
+def dob_acceleration(compensate: bool) -> Builder:
+    def build(
+        arm: SerialArm, rng: np.random.Generator, output: OutputStage
+    ) -> tuple[dict[str, Any], Callable[[], Reference]]:
+        wc, wo = rng.uniform(20, 90), rng.uniform(400, 1600)
+        kp, kd, ki = -3 * wc**2, -3 * wc, -(wc**3)
+        pole = np.exp(-wo * SAMPLE_PERIOD_S)
+        observer = (1 - pole**4, wo * (1 - pole), wo**2 / 2 * (1 - pole), wo**3 / 3 * (1 - pole))
+        law = {
+            "kind": "dob-acceleration",
+            "feedback": {"kp": kp, "kd": kd, "ki": ki},
+            "observer": list(observer),
+            "filter_time_constant_s": 1e-3,
+            "disturbance_compensation": compensate,
+        }
+        return law, lambda: DobAcceleration(
+            kp, kd, ki, observer, 1e-3, arm.mass_matrix, arm.gravity_torque, fresh(output), compensate
+        )
+
+    return build
+
+
+def pid(
+    arm: SerialArm, rng: np.random.Generator, output: OutputStage
+) -> tuple[dict[str, Any], Callable[[], Reference]]:
+    n = len(arm.links)
+    kp, kd, ki = rng.uniform(1e3, 1e5, n), rng.uniform(1e2, 1e4, n), rng.uniform(1e3, 1e6, n)
+    friction = np.array([link.friction_nm_s for link in arm.links])
+    law = {
+        "kind": "pid",
+        **{name: gain.tolist() for name, gain in (("kp", kp), ("kd", kd), ("ki", ki))},
+        "velocity_filter_time_constant_s": FILTER_S,
+    }
+
+    def coriolis(y: FloatArray, w: FloatArray, v: FloatArray) -> FloatArray:
+        return arm.coriolis_torque(y, w, v) + friction * v
+
+    return law, lambda: Pid(
+        kp, kd, ki, arm.mass_matrix, coriolis, arm.gravity_torque, speed_filter(), fresh(output)
+    )
+
+
+def computed_torque(bandwidth: float) -> Builder:
+    def build(
+        arm: SerialArm, rng: np.random.Generator, output: OutputStage
+    ) -> tuple[dict[str, Any], Callable[[], Reference]]:
+        n = len(arm.links)
+        gp, gd, gi = rng.uniform(1e3, 1e4, n), rng.uniform(50, 200, n), rng.uniform(1e4, 1e5, n)
+        law = {
+            "kind": "ctc-dob" if bandwidth else "ctc",
+            **{name: gain.tolist() for name, gain in (("gp", gp), ("gd", gd), ("gi", gi))},
+            "velocity_filter_time_constant_s": FILTER_S,
+            "disturbance_observer_bandwidth_rad_s": bandwidth,
+        }
+
+        def coriolis(y: FloatArray, w: FloatArray) -> FloatArray:
+            return arm.coriolis_torque(y, w) + arm.friction_torque(w)
+
+        return law, lambda: ComputedTorque(
+            gp, gd, gi, bandwidth, arm.mass_matrix, coriolis, arm.gravity_torque, speed_filter(), fresh(output)
+        )
+
+    return build
+
+
+LAWS: dict[str, Builder] = {
+    "dob-acceleration": dob_acceleration(compensate=True),
+    "dob-acceleration without compensation": dob_acceleration(compensate=False),
+    "pid": pid,
+    "ctc": computed_torque(0.0),
+    "ctc-dob": computed_torque(200.0),
+}
+
+
+def random_sample(joints: int, rng: np.random.Generator) -> Sample:
+    reference = rng.uniform(-3, 3, joints)
+    return Sample(
+        angle=reference + rng.normal(0, 1e-3, joints),
+        speed=rng.normal(0, 2, joints),
+        reference_angle=reference,
+        reference_speed=rng.normal(0, 2, joints),
+        reference_acceleration=rng.normal(0, 5, joints),
+    )
+
+
+def step_both(controller: _runtime.Controller, reference: Reference, s: Sample) -> tuple[_runtime.StepReport, Answer]:
+    report = controller.step(s.angle, s.reference_angle, s.reference_speed, s.reference_acceleration, s.speed)
+    return report, reference.step(s)
+
+
+@pytest.mark.parametrize("limits", ["wide", "tight"])
+@pytest.mark.parametrize("joints", [2, 3])
+@pytest.mark.parametrize("name", LAWS)
+def test_when_inputs_are_random_expect_the_step_of_the_formulas(name: str, joints: int, limits: str) -> None:
+    rng = np.random.default_rng(20240 + joints)
+    arm, numpy_arm = random_arm(joints, rng)
+    bounds = {"wide": (1e9, 1e15), "tight": (300.0, 4e4)}[limits]
+    output = OutputStage(np.full(joints, bounds[0]), np.full(joints, bounds[1]), SAMPLE_PERIOD_S)
+    law, make_reference = LAWS[name](numpy_arm, rng, output)
+    table = {"torque_nm": output.torque_nm.tolist(), "slew_nm_per_s": output.slew_nm_per_s.tolist()}
+    controller = _runtime.Controller(_runtime.Artifact.parse(artifact_bytes(arm, law, table)))
+    limited = 0
+    for _ in range(RUNS):
+        controller.reset()
+        reference = make_reference()
+        scale = 0.0
+        for _ in range(STEPS_PER_RUN):
+            report, answer = step_both(controller, reference, random_sample(joints, rng))
+            scale = max(scale, answer.scale)  # the state carries what earlier summands rounded off
+            for mine, theirs in (
+                (report.torque_commanded, answer.torque_commanded),
+                (report.torque_applied, answer.torque_applied),
+                (report.estimated_disturbance, answer.estimated_disturbance),
+            ):
+                np.testing.assert_allclose(mine[:joints], theirs, rtol=0, atol=RELATIVE_TOLERANCE * scale)
+            limited += int(np.any(answer.torque_applied != answer.torque_commanded))
+    assert (limited > 0) == (limits == "tight")
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3, 4])
+def test_when_angles_are_random_expect_premises_inertia_and_gravity_of_the_python_model(joints: int) -> None:
+    rng = np.random.default_rng(7 + joints)
+    arm, numpy_arm = random_arm(joints, rng)
+    law, _ = LAWS["ctc"](numpy_arm, rng, OutputStage(np.ones(joints), np.ones(joints), SAMPLE_PERIOD_S))
+    limits = {"torque_nm": [1e3] * joints, "slew_nm_per_s": [1e6] * joints}
+    artifact = _runtime.Artifact.parse(artifact_bytes(arm, law, limits))
+    affine = arm.inertia_affine()
+    for _ in range(1000):
+        angle, speed = rng.uniform(-3.2, 3.2, joints), rng.normal(0, 3, joints)
+        alpha = np.cumsum(angle)
+        expected = [np.cos(alpha[k + gap] - alpha[k]) for gap in range(1, joints) for k in range(joints - gap)]
+        premise = artifact.premises(angle)
+        np.testing.assert_allclose(premise, expected, rtol=0, atol=1e-12)
+        scale = np.abs(affine.constant).max() + np.abs(affine.coefficients).sum()
+        np.testing.assert_allclose(artifact.inertia(premise), arm.inertia(angle), rtol=0, atol=1e-12 * scale)
+        gravity_scale = np.abs(arm.gravity_constants).sum()
+        np.testing.assert_allclose(artifact.gravity(angle), arm.gravity(angle), rtol=0, atol=1e-12 * gravity_scale)
+        coriolis = arm.coriolis(angle, speed)
+        coriolis_scale = np.abs(arm.inertia_constants).sum() * np.abs(np.cumsum(speed)).max() ** 2 + np.abs(coriolis).max()
+        mine = artifact.coriolis(angle, speed, speed)
+        np.testing.assert_allclose(mine, coriolis, rtol=0, atol=1e-12 * coriolis_scale)
+
+
+def test_when_an_array_has_the_wrong_length_expect_one_line_naming_it() -> None:
+    rng = np.random.default_rng(1)
+    arm, numpy_arm = random_arm(2, rng)
+    law, _ = pid(numpy_arm, rng, OutputStage(np.ones(2), np.ones(2), SAMPLE_PERIOD_S))
+    limits = {"torque_nm": [1e3] * 2, "slew_nm_per_s": [1e6] * 2}
+    controller = _runtime.Controller(_runtime.Artifact.parse(artifact_bytes(arm, law, limits)))
+    with pytest.raises(InputError, match=r"reference_speed: got shape \(3,\), expected shape \(2,\)"):
+        controller.step([0, 0], [0, 0], [0, 0, 0], [0, 0], [0, 0])
