@@ -276,7 +276,7 @@ def _sinc_stationary_point(k: int) -> IntervalValue:
     with workprec(_PRECISION_BITS + 40):
         guess = (k + mp.mpf(1) / 2) * mp.pi
         root = findroot(lambda x: x * mp.cos(x) - mp.sin(x), guess - 1 / guess)
-        width = mp.mpf(2) ** (-_PRECISION_BITS // 2)
+        width = mp.mpf(2) ** (20 - _PRECISION_BITS)
         low, high = _iv.mpf(root - width), _iv.mpf(root + width)
     ends = [x * _iv.cos(x) - _iv.sin(x) for x in (low, high)]
     if not (ends[0].b < 0 < ends[1].a or ends[1].b < 0 < ends[0].a):
