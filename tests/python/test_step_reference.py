@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from quasilpv import _runtime
+from quasilpv.errors import InputError
 from reference.random_arms import SAMPLE_PERIOD_S, artifact_bytes, random_arm
 from reference.serial_arm import SerialArm
 from reference.step import (
@@ -19,9 +22,6 @@ from reference.step import (
     Sample,
     SpeedFilter,
 )
-
-from quasilpv import _runtime
-from quasilpv.errors import InputError
 
 RELATIVE_TOLERANCE = 1e-12  # of the largest summand: observer gains make single summands large
 RUNS, STEPS_PER_RUN = 200, 5
@@ -76,9 +76,7 @@ def pid(
     def coriolis(y: FloatArray, w: FloatArray, v: FloatArray) -> FloatArray:
         return arm.coriolis_torque(y, w, v) + friction * v
 
-    return law, lambda: Pid(
-        kp, kd, ki, arm.mass_matrix, coriolis, arm.gravity_torque, speed_filter(), fresh(output)
-    )
+    return law, lambda: Pid(kp, kd, ki, arm.mass_matrix, coriolis, arm.gravity_torque, speed_filter(), fresh(output))
 
 
 def computed_torque(bandwidth: float) -> Builder:
@@ -177,7 +175,9 @@ def test_when_angles_are_random_expect_premises_inertia_and_gravity_of_the_pytho
         gravity_scale = np.abs(arm.gravity_constants).sum()
         np.testing.assert_allclose(artifact.gravity(angle), arm.gravity(angle), rtol=0, atol=1e-12 * gravity_scale)
         coriolis = arm.coriolis(angle, speed)
-        coriolis_scale = np.abs(arm.inertia_constants).sum() * np.abs(np.cumsum(speed)).max() ** 2 + np.abs(coriolis).max()
+        coriolis_scale = (
+            np.abs(arm.inertia_constants).sum() * np.abs(np.cumsum(speed)).max() ** 2 + np.abs(coriolis).max()
+        )
         mine = artifact.coriolis(angle, speed, speed)
         np.testing.assert_allclose(mine, coriolis, rtol=0, atol=1e-12 * coriolis_scale)
 

@@ -1,4 +1,4 @@
-"""Random arms, and artifacts of every law for them, built with the package and compared against the numpy references."""
+"""Random arms, and artifacts of every law for them, built with the package."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ def random_arm(joints: int, rng: np.random.Generator) -> tuple[PlanarSerialArm, 
     return arm, SerialArm(tuple(Link(*link) for link in links), arm.gravity_m_s2)
 
 
-def artifact_document(arm: PlanarSerialArm, law: Mapping[str, Any], limits: Mapping[str, list[float]]) -> dict[str, Any]:
+def artifact_document(
+    arm: PlanarSerialArm, law: Mapping[str, Any], limits: Mapping[str, list[float]]
+) -> dict[str, Any]:
     """Artifact with the given law (without its inertia table) for the arm; every premise ranges over [-1, 1]."""
     n = arm.joints
     affine: AffineMatrix = arm.inertia_affine()

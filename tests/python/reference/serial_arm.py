@@ -1,14 +1,14 @@
 """Planar serial arm with n links, from the velocities of the centres of mass.
 
-Joint angles are relative, theta = 0 hangs, gravity points along -Y. Link k has length L_k, its centre of mass at distance r_k
-from its joint, and inertia I_k about its joint axis, so I_k - m_k r_k^2 about the centre of mass. With alpha_k = theta_1 + ... +
-theta_k the centre of mass of link k is at
+Joint angles are relative, theta = 0 hangs, gravity points along -Y. Link k has length L_k, its centre of mass at
+distance r_k from its joint, and inertia I_k about its joint axis, so I_k - m_k r_k^2 about the centre of mass. With
+alpha_k = theta_1 + ... + theta_k the centre of mass of link k is at
 
     p_k = sum_{i<k} L_i (sin alpha_i, -cos alpha_i) + r_k (sin alpha_k, -cos alpha_k)
 
 and, with J_k = dp_k/dtheta and s_k = dalpha_k/dtheta,
 
-    M = sum_k m_k J_k' J_k + (I_k - m_k r_k^2) s_k' s_k,   c = sum_k m_k J_k' (dJ_k/dt) w,   G = g sum_k m_k J_k[y-row]'.
+    M = sum_k m_k J_k' J_k + (I_k - m_k r_k^2) s_k' s_k,   c = sum_k m_k J_k' (dJ_k/dt) w,   G = g sum_k m_k (J_k)_y'.
 """
 
 from __future__ import annotations
@@ -89,8 +89,7 @@ class SerialArm:
     def residual(self, time_s: float, state: FloatArray, derivative: FloatArray, torque: FloatArray) -> FloatArray:
         """F(t, x, x') = [th' - w; M w' + c + fv w + G - Gamma - Gamma_ext(t)] with x = (th, w)."""
         n = len(self.links)
-        angle, speed = state[:n], state[n:]
-        return np.concatenate([derivative[:n] - speed, sum(self.torque_terms(time_s, state, derivative, torque))])
+        return np.concatenate([derivative[:n] - state[n:], sum(self.torque_terms(time_s, state, derivative, torque))])
 
     def torque_terms(
         self, time_s: float, state: FloatArray, derivative: FloatArray, torque: FloatArray

@@ -1,8 +1,9 @@
 """One sample of every control law, from the formulas.
 
-n joints, T the sample period, y and w_y the measured angles and speeds, (r, r', r'') the reference, M and G the design inertia and
-gravity at y. Every law ends in the same output stage: saturate, then limit the change against the last torque (the first torque
-has none), and the integral of joint j is frozen while the limits cut off what its integral action is pushing towards.
+n joints, T the sample period, y and w_y the measured angles and speeds, (r, r', r'') the reference, M and G the design
+inertia and gravity at y. Every law ends in the same output stage: saturate, then limit the change against the last
+torque (the first torque has none), and the integral of joint j is frozen while the limits cut off what its integral
+action is pushing towards.
 """
 
 from __future__ import annotations
@@ -61,11 +62,9 @@ class OutputStage:
         return limited
 
 
-def integrate(
-    integral: FloatArray, error: FloatArray, gain: FloatArray, T: float, commanded: FloatArray, applied: FloatArray
-) -> FloatArray:
-    """e_I + T e, except where the limits cut off torque in the direction of gain * e."""
-    winds_up = (commanded - applied) * gain * error > 0.0
+def integrate(integral: FloatArray, error: FloatArray, gain: FloatArray, T: float, cut_off: FloatArray) -> FloatArray:
+    """e_I + T e, except where the torque cut off by the limits has the direction of gain * e."""
+    winds_up = cut_off * gain * error > 0.0
     return np.where(winds_up, integral, integral + T * error)
 
 
@@ -105,7 +104,7 @@ class DobAcceleration:
         commanded = M @ np.asarray(sum(terms)) + G
         applied = self.output.apply(commanded)
         estimate = a_d
-        e_I = integrate(e_I, y - s.reference_angle, np.full_like(y, self.ki), T, commanded, applied)
+        e_I = integrate(e_I, y - s.reference_angle, np.full_like(y, self.ki), T, commanded - applied)
         a = np.linalg.solve(M, applied - G) + a_d
         th = th + T * w + T**2 / 2 * a + T**3 / 6 * j_d
         w = w + T * a + T**2 / 2 * j_d
@@ -116,7 +115,7 @@ class DobAcceleration:
 
 @dataclass
 class SpeedFilter:
-    """First-order low-pass filter of the measured speed, w <- q w + (1 - q) w_y, q = exp(-T/T_f), from the first sample."""
+    """Low-pass filter of the measured speed from the first sample on: w <- q w + (1 - q) w_y, q = exp(-T/T_f)."""
 
     q: float
     w: FloatArray | None = None
@@ -154,15 +153,16 @@ class Pid:
         )
         commanded = np.asarray(sum(summands))
         applied = self.output.apply(commanded)
-        self.integral = integrate(integral, error, self.ki, self.output.T, commanded, applied)
+        self.integral = integrate(integral, error, self.ki, self.output.T, commanded - applied)
         return Answer(commanded, applied, np.zeros_like(w), summands)
 
 
 @dataclass
 class ComputedTorque:
-    """u = M (r'' + gp e + gd (r' - w) + gi int e - a_hat) + N(y, w) w + G with e = r - y (Dehak 2022, III.56, sign corrected).
+    """u = M (r'' + gp e + gd (r' - w) + gi int e - a_hat) + N(y, w) w + G with e = r - y.
 
-    The disturbance observer of bandwidth c compares the speed reached with the speed the model predicts over one sample:
+    Dehak 2022, III.56, with the sign of the estimate corrected. The disturbance observer of bandwidth c compares the
+    speed reached with the speed the model predicts over one sample:
     a_hat+ = q a_hat + (1 - q) ((w+ - w)/T - M^-1 (gamma_applied - N w - G)), q = exp(-c T), from a_hat = 0.
     """
 
@@ -195,7 +195,7 @@ class ComputedTorque:
         ]
         commanded = M @ np.asarray(sum(terms)) + bias
         applied = self.output.apply(commanded)
-        self.integral = integrate(integral, error, self.gi, T, commanded, applied)
+        self.integral = integrate(integral, error, self.gi, T, commanded - applied)
         self.a_hat, self.before = a_hat, (w, np.linalg.solve(M, applied - bias))
         summands = (*(np.abs(M) @ np.abs(term) for term in terms), bias)
         return Answer(commanded, applied, M @ a_hat, summands)
