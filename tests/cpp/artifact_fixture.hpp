@@ -1,0 +1,217 @@
+// Artifacts for tests, built here from formulas that stand here: an n-joint arm with easy closed forms.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <string>
+
+#include "quasilpv/document.hpp"
+#include "quasilpv/step.hpp"
+
+namespace quasilpv::testing {
+
+/// M(y) = M_0 + sum_p cos(y_p) M_p, G_j(y) = 9.81 (j + 1) sin(y_j), N(y, w) = diag(0.3 (j + 1) w_j sin(y_j)).
+/// M is diagonally dominant, so positive definite everywhere; one premise per joint, cos(y_p) in [-0.5, 1].
+struct TestArm {
+  int joints;
+
+  static constexpr double kLower = -0.5;
+  static constexpr double kUpper = 1.0;
+  static constexpr double kCentre = 0.2;
+
+  Eigen::MatrixXd constant_inertia() const {
+    Eigen::MatrixXd inertia = Eigen::MatrixXd::Constant(joints, joints, 0.1);
+    for (int j = 0; j < joints; ++j) {
+      inertia(j, j) = 8.0 - 0.5 * j;
+    }
+    return inertia;
+  }
+
+  Eigen::MatrixXd inertia_slope(int premise) const {
+    Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(joints, joints);
+    const int next = (premise + 1) % joints;
+    slope(premise, premise) = 1.0;
+    slope(premise, next) += 0.25;
+    slope(next, premise) += 0.25;
+    return slope;
+  }
+
+  Eigen::MatrixXd inertia_of_premises(const Eigen::VectorXd& premise) const {
+    Eigen::MatrixXd inertia = constant_inertia();
+    for (int p = 0; p < joints; ++p) {
+      inertia += premise(p) * inertia_slope(p);
+    }
+    return inertia;
+  }
+
+  Eigen::VectorXd premises(const Eigen::VectorXd& angle) const {
+    return angle.array().cos().max(kLower).min(kUpper).matrix();
+  }
+
+  Eigen::MatrixXd inertia(const Eigen::VectorXd& angle) const { return inertia_of_premises(premises(angle)); }
+
+  Eigen::VectorXd gravity(const Eigen::VectorXd& angle) const {
+    Eigen::VectorXd torque(joints);
+    for (int j = 0; j < joints; ++j) {
+      torque(j) = 9.81 * (j + 1) * std::sin(angle(j));
+    }
+    return torque;
+  }
+
+  /// N(angle, speed) v
+  Eigen::VectorXd coriolis(const Eigen::VectorXd& angle, const Eigen::VectorXd& speed, const Eigen::VectorXd& v) const {
+    Eigen::VectorXd torque(joints);
+    for (int j = 0; j < joints; ++j) {
+      torque(j) = 0.3 * (j + 1) * speed(j) * std::sin(angle(j)) * v(j);
+    }
+    return torque;
+  }
+
+  Json premises_program() const {
+    Json code = Json::array();
+    for (int j = 0; j < joints; ++j) {
+      code.insert(code.end(), {Json{"angle", j}, Json{"cos"}});
+    }
+    return {{"outputs", joints}, {"code", code}};
+  }
+
+  Json gravity_program() const {
+    Json code = Json::array();
+    for (int j = 0; j < joints; ++j) {
+      code.insert(code.end(), {Json{"const", 9.81 * (j + 1)}, Json{"angle", j}, Json{"sin"}, Json{"mul"}});
+    }
+    return {{"outputs", joints}, {"code", code}};
+  }
+
+  /// N(y, w) v with v the operand named `factor`.
+  Json coriolis_program(const std::string& factor) const {
+    Json code = Json::array();
+    for (int j = 0; j < joints; ++j) {
+      code.insert(code.end(), {Json{"const", 0.3 * (j + 1)}, Json{"speed", j}, Json{"mul"}, Json{"angle", j},
+                               Json{"sin"}, Json{"mul"}, Json{factor, j}, Json{"mul"}});
+    }
+    return {{"outputs", joints}, {"code", code}};
+  }
+
+  static Json rows(const Eigen::MatrixXd& matrix) {
+    Json result = Json::array();
+    for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+      Json row = Json::array();
+      for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
+        row.push_back(matrix(i, j));
+      }
+      result.push_back(row);
+    }
+    return result;
+  }
+
+  /// Groups of one premise: X_i = X(z_c) + G (c_p - z_c,p) X_p.
+  Json inertia_table() const {
+    const Eigen::MatrixXd centre = inertia_of_premises(Eigen::VectorXd::Constant(joints, kCentre));
+    Json blocks = Json::array();
+    for (int p = 0; p < joints; ++p) {
+      Json vertices = Json::array();
+      for (const double corner : {kLower, kUpper}) {
+        vertices.push_back(rows(centre + joints * (corner - kCentre) * inertia_slope(p)));
+      }
+      blocks.push_back({{"kind", "box"}, {"premises", Json::array({p})}, {"vertices", vertices}});
+    }
+    const auto repeated = [this](double value) { return Json(std::vector<double>(joints, value)); };
+    return {{"premises", joints},
+            {"lower", repeated(kLower)},
+            {"upper", repeated(kUpper)},
+            {"centre", repeated(kCentre)},
+            {"blocks", blocks}};
+  }
+};
+
+inline constexpr double kSamplePeriod = 1e-3;
+
+/// Member `law` of kind `kind`, with gains that make sense at 1 kHz.
+inline Json law_table(const std::string& kind, const TestArm& arm) {
+  const auto repeated = [&arm](double value) { return Json(std::vector<double>(arm.joints, value)); };
+  Json law = {{"kind", kind}, {"inertia", arm.inertia_table()}};
+  if (kind == "dob-acceleration") {
+    law.update({{"feedback", {{"kp", -4800.0}, {"kd", -120.0}, {"ki", -64000.0}}},
+                {"observer", {0.9, 550.0, 150000.0, 1.6e7}},
+                {"filter_time_constant_s", 1e-3},
+                {"disturbance_compensation", true}});
+  } else if (kind == "pid") {
+    law.update({{"kp", repeated(4000.0)},
+                {"kd", repeated(300.0)},
+                {"ki", repeated(9000.0)},
+                {"velocity_filter_time_constant_s", 2e-3}});
+  } else {
+    law.update({{"gp", repeated(1200.0)},
+                {"gd", repeated(60.0)},
+                {"gi", repeated(8000.0)},
+                {"velocity_filter_time_constant_s", 2e-3},
+                {"disturbance_observer_bandwidth_rad_s", kind == "ctc-dob" ? 50.0 : 0.0}});
+  }
+  return law;
+}
+
+/// A complete artifact without its hash.
+inline Json artifact_table(const std::string& kind, int joints) {
+  const TestArm arm{joints};
+  Json programs = {{"premises", arm.premises_program()}, {"gravity", arm.gravity_program()}};
+  if (kind == "pid") {
+    programs["coriolis_reference"] = arm.coriolis_program("reference_speed");
+  } else if (kind != "dob-acceleration") {
+    programs["coriolis"] = arm.coriolis_program("speed");
+  }
+  const Json interval = Json(std::vector<Json>(joints, Json::array({-2.0, 2.0})));
+  return {{"schema", "quasilpv.artifact"},
+          {"schema_version", 1},
+          {"name", "test-arm-" + kind},
+          {"creator", {{"tool", "artifact_fixture"}, {"version", "1"}}},
+          {"design_hash", std::string(64, 'a')},
+          {"units", "SI"},
+          {"sample_period_s", kSamplePeriod},
+          {"joints", joints},
+          {"robot", {{"id", "test-arm"}, {"parameters", {{"gravity_m_s2", 9.81}}}}},
+          {"payloads", Json::object()},
+          {"domain", {{"angle_rad", interval}, {"speed_rad_s", interval}}},
+          {"limits",
+           {{"torque_nm", std::vector<double>(joints, 1500.0)}, {"slew_nm_per_s", std::vector<double>(joints, 1e6)}}},
+          {"programs", programs},
+          {"law", law_table(kind, arm)},
+          {"witness", nullptr},
+          {"verification", {{"note", "\u00fcbung \"quoted\"\n"}}}};
+}
+
+inline Json with_hash(Json document) {
+  document["hash"] = sha256_hex(canonical_json(document));
+  return document;
+}
+
+/// JSON twin of a document without hash.
+inline std::string json_twin(const Json& document) { return canonical_json(with_hash(document)); }
+
+/// CBOR twin of a document without hash.
+inline std::string cbor_twin(const Json& document) { return canonical_cbor(with_hash(document)); }
+
+/// The message of the InputError that `action` must throw, or a note that it threw none.
+template <class Action>
+std::string refusal(Action action) {
+  try {
+    action();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+inline JointArray to_joint_array(const Eigen::VectorXd& values) {
+  JointArray array{};
+  for (Eigen::Index j = 0; j < values.size(); ++j) {
+    array[static_cast<std::size_t>(j)] = values(j);
+  }
+  return array;
+}
+
+inline Eigen::VectorXd to_vector(const JointArray& array, int joints) {
+  return Eigen::Map<const Eigen::VectorXd>(array.data(), joints);
+}
+
+}  // namespace quasilpv::testing
