@@ -1,4 +1,4 @@
-"""The planar serial arm against two independent derivations: a symbolic Lagrangian and Pinocchio; and its invariants."""
+"""The planar serial arm against a symbolic Lagrangian and Pinocchio, both independent of it; and its invariants."""
 
 from dataclasses import replace
 from functools import cache
@@ -51,7 +51,7 @@ def random_state(arm: PlanarSerialArm, rng: np.random.Generator) -> tuple[NDArra
     return rng.uniform(-np.pi, np.pi, arm.joints), rng.uniform(-5, 5, arm.joints)
 
 
-# ---- two independent derivations ---------------------------------------------------------------------------------------
+# ---- two independent derivations -------------------------------------------------------------------------------------
 
 
 @cache
@@ -171,7 +171,7 @@ def test_inertia_is_affine_in_its_premises(case: tuple) -> None:
     assert_allclose(affine.evaluate(z), arm.inertia(theta), atol=1e-12 * np.abs(affine.constant).max())
 
 
-# ---- invariants --------------------------------------------------------------------------------------------------------
+# ---- invariants ------------------------------------------------------------------------------------------------------
 
 
 def inertia_rate(arm: PlanarSerialArm, theta: NDArray[np.float64], omega: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -263,7 +263,7 @@ def test_friction_takes_away_the_power_it_absorbs() -> None:
     assert_allclose((ahead - behind) / (2 * step), -4.0 * omega @ omega, rtol=1e-6)
 
 
-# ---- the numbers of the thesis -----------------------------------------------------------------------------------------
+# ---- the numbers of the thesis ---------------------------------------------------------------------------------------
 
 
 def test_constants_of_arm3_are_the_printed_ones() -> None:
@@ -305,7 +305,7 @@ def test_pid_gains_from_the_largest_inertias_are_the_printed_digits() -> None:
     assert abs(3 * truncated * w**2 / 1e4 - 24.280) > 4e-3  # r_2 = .489 does not give them
 
 
-# ---- kinematics --------------------------------------------------------------------------------------------------------
+# ---- kinematics ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("equilibrium", ["hanging", "upright"])
@@ -334,7 +334,7 @@ def test_when_arm_has_not_three_joints_expect_inverse_kinematics_refused() -> No
         ARM2.inverse_kinematics([0.5, -0.5, 0.0])
 
 
-# ---- perturbation ------------------------------------------------------------------------------------------------------
+# ---- perturbation ----------------------------------------------------------------------------------------------------
 
 
 def test_loaded_plant_has_the_parallel_axis_inertias_and_a_definite_inertia_matrix() -> None:
@@ -361,7 +361,7 @@ def test_payload_fraction_runs_from_the_nominal_to_the_loaded_plant() -> None:
 
 
 def test_when_payload_fraction_is_outside_0_1_expect_refusal() -> None:
-    with pytest.raises(InputError, match="fraction: got 1.1"):
+    with pytest.raises(InputError, match=r"fraction: got 1\.1"):
         PayloadSet((1.4,), (1.4,)).scales_at(1.1)
 
 
