@@ -80,6 +80,8 @@ def _got_and_expected(kind: str, message: str, value: Any, context: dict[str, An
         "literal_error": (got, str(context.get("expected"))),
         "union_tag_invalid": (repr(context.get("tag")), f"one of {context.get('expected_tags')}"),
         "union_tag_not_found": ("nothing", f"a member {context.get('discriminator')}"),
+        "too_long": (f"{context.get('actual_length')} entries", f"at most {context.get('max_length')}"),
+        "too_short": (f"{context.get('actual_length')} entries", f"at least {context.get('min_length')}"),
         "string_pattern_mismatch": (got, f"text matching {context.get('pattern')}"),
     }
     return in_our_words.get(kind, plain)
