@@ -107,7 +107,8 @@ class _Search:
     tried: int = 0
     best: Candidate | None = None
     best_point: tuple[float, float, float] | None = None
-    most_margin: float = 0.0
+    widest_margin: float = 0.0
+    quietest_nm: float = math.inf
 
     def gains(self, wc: float, wo: float) -> tuple[ChainGains, ChainGains] | None:
         """Verified gains of a pair of bandwidths (per sample), or None."""
@@ -138,7 +139,7 @@ class _Search:
         spare = self.specification.margin_spare
         smallest = self.needed.highest * spare / margin[1]
         largest = self.needed.lowest / (margin[0] * spare)
-        self.most_margin = max(self.most_margin, largest / smallest)
+        self.widest_margin = max(self.widest_margin, margin[1] / margin[0])
         if smallest > largest:
             return
         loop = SampledLoop(law)
@@ -150,6 +151,7 @@ class _Search:
             if self.best is not None and gain >= self.best.disturbance_gain:
                 continue
             torque = max(loop.command_activity(ratio) for ratio in ratios) * self.noise_nm * scale
+            self.quietest_nm = min(self.quietest_nm, torque)
             if torque <= self.activity_bound_nm:
                 yield Candidate(law, scale, margin, needed, gain, torque, bandwidths)
 
@@ -189,12 +191,7 @@ def design_acceleration_law(
                 search.visit(*point)
                 progress(search.tried, total)
     if search.best is None or search.best_point is None:
-        raise InfeasibleError(
-            f"{robot.id}: no dob-acceleration design at {specification.rate_hz:g} Hz: the payloads need "
-            f"M_t/M_n of {needed.highest / needed.lowest:.2f} to 1 times {specification.margin_spare**2:.2f}, "
-            f"torque increments of at most {search.activity_bound_nm:.3g} N m; best margin found "
-            f"{search.most_margin * needed.highest / needed.lowest * specification.margin_spare**2:.2f} to 1"
-        )
+        raise InfeasibleError(_why_not(search))
     wc, wo, _ = search.best_point
     return AccelerationDesign(
         search.best,
@@ -203,6 +200,21 @@ def design_acceleration_law(
         needed,
         _growth_rates(search.best, specification),
         search.tried,
+    )
+
+
+def _why_not(search: _Search) -> str:
+    """One line: which requirement no point of the search met, wanted and found."""
+    wanted, needed = search.specification, search.needed
+    width = needed.highest / needed.lowest * wanted.margin_spare**2
+    about = f"{search.robot.id}: no dob-acceleration design at {wanted.rate_hz:g} Hz"
+    if math.isinf(search.quietest_nm):
+        return (
+            f"{about}: the inertia margin must span {width:.3g} to 1, the widest found spans {search.widest_margin:.3g}"
+        )
+    return (
+        f"{about}: encoder quantisation may cause torque increments of {search.activity_bound_nm:.3g} N m rms, "
+        f"the quietest design inside the margin has {search.quietest_nm:.3g}"
     )
 
 
