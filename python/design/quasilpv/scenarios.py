@@ -9,14 +9,14 @@ noise.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.canonical import MAX_SAFE_INTEGER, Document, normalise, parse_strict_json
+from quasilpv.artifact.canonical import MAX_SAFE_INTEGER, Document, member_path, normalise, parse_strict_json
 from quasilpv.artifact.files import read_bytes, write_atomically
 from quasilpv.artifact.programs import MAX_JOINTS
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
@@ -144,12 +144,27 @@ class Scenario(StrictModel):
 
     @classmethod
     def from_document(cls, document: Mapping[str, object], source: str = "scenario") -> Scenario:
-        """Return the scenario of a JSON tree.
+        """Return the scenario of a JSON tree, in which every member must be present, those with a default too.
 
         Raises:
             InputError: a rule of the format is broken; the message names the field.
         """
-        return validate(cls, document, source, tags=("ida", "rk4"))
+        scenario = validate(cls, document, source, tags=("ida", "rk4"))
+        for path in _missing_members(document, scenario.to_document(), ""):
+            raise InputError(source, path, "nothing", "this member")
+        return scenario
+
+
+def _missing_members(given: object, complete: object, path: str) -> Iterator[str]:
+    if isinstance(given, Mapping) and isinstance(complete, Mapping):
+        for key, member in complete.items():
+            if key in given:
+                yield from _missing_members(given[key], member, member_path(path, key))
+            else:
+                yield member_path(path, key)
+    elif isinstance(given, Sequence) and isinstance(complete, list):
+        for i, (item, whole) in enumerate(zip(given, complete, strict=True)):
+            yield from _missing_members(item, whole, f"{path}[{i}]")
 
 
 @dataclass(frozen=True)

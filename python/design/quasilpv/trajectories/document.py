@@ -157,9 +157,8 @@ class Trajectory:
             starts = factors[order] * c[order]
             scale = np.maximum(1.0, np.maximum(np.abs(starts[1:]), np.abs(ends[:-1])))
             jumps = np.abs(starts[1:] - ends[:-1]) / scale
-            if jumps.size and not jumps.max() <= CONTINUITY_TOLERANCE:
-                segment, joint = np.unravel_index(int(jumps.argmax()), jumps.shape)
-                got = f"a jump of {name} of {jumps.max():.3g} (relative) into this segment"
+            for segment, joint in np.argwhere(~(jumps <= CONTINUITY_TOLERANCE))[:1]:
+                got = f"a jump of {name} of {jumps[segment, joint]:.3g} (relative) into this segment"
                 field = f"coefficients[{segment + 1}][{joint}]"
                 raise InputError(source, field, got, f"at most {CONTINUITY_TOLERANCE}")
 

@@ -1,0 +1,171 @@
+"""Scenarios: what the registry builds, and the rules of the format."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quasilpv.errors import InputError
+from quasilpv.scenarios import (
+    IdaIntegrator,
+    Rk4Integrator,
+    Scenario,
+    Sensors,
+    build_scenario,
+    read_scenario,
+    tracking_task,
+    tracking_tasks,
+    write_scenario,
+)
+from quasilpv.systems.registry import robot
+from quasilpv.trajectories import Trajectory
+
+ARM3 = robot("arm3")
+TRAJECTORIES = {task.id: task.trajectory(ARM3.model, ARM3.domain) for task in tracking_tasks()}
+SQUARE = TRAJECTORIES["serial-square"]
+FORMATS = Path(__file__).parents[2] / "docs" / "reference" / "formats.md"
+
+
+def test_when_the_registry_is_listed_expect_the_two_tracking_experiments_of_the_serial_arm() -> None:
+    assert list(TRAJECTORIES) == ["serial-square", "serial-circle"]
+    assert {task.robot for task in tracking_tasks()} == {"arm3"}
+    assert all(trajectory.name == name for name, trajectory in TRAJECTORIES.items())
+
+
+def test_when_a_scenario_is_unknown_expect_the_known_ones_in_the_error() -> None:
+    assert tracking_task("serial-circle").id == "serial-circle"
+    with pytest.raises(InputError, match="got spiral, expected one of serial-square, serial-circle"):
+        tracking_task("spiral")
+
+
+@pytest.mark.parametrize("name", TRAJECTORIES)
+def test_when_a_scenario_is_built_expect_the_plant_to_start_at_rest_on_the_reference(name: str) -> None:
+    scenario = build_scenario(ARM3, TRAJECTORIES[name])
+    assert scenario.name == name
+    assert scenario.duration_s == 3.0
+    x, y, phi = ARM3.model.forward_kinematics(scenario.initial.angle_rad)
+    start = {"serial-square": (1.3, -1.75), "serial-circle": (1.7, -1.55)}[name]
+    np.testing.assert_allclose((x, y, phi), (*start, np.pi / 4), atol=1e-12)
+    assert scenario.initial.speed_rad_s == (0.0, 0.0, 0.0)
+
+
+def test_when_the_plant_is_nominal_expect_table_i_4_and_hanging_equilibrium() -> None:
+    plant = build_scenario(ARM3, SQUARE, plant="nominal").plant
+    assert (plant.kind, plant.label, plant.gravity_m_s2) == ("serial-arm", "nominal", 9.81)
+    assert [link.length_m for link in plant.links] == [1.0, 0.9, 0.8]
+    assert [link.mass_kg for link in plant.links] == [5.0, 4.9, 4.2]
+    assert [link.inertia_kg_m2 for link in plant.links] == pytest.approx([2.0, 1.9, 1.3], rel=1e-15)
+    assert [link.friction_nm_s for link in plant.links] == [0.0, 0.0, 0.0]
+
+
+def test_when_the_plant_is_perturbed_expect_chapter_iv_with_inertias_about_the_centres_of_mass_unchanged() -> None:
+    nominal = build_scenario(ARM3, SQUARE, plant="nominal").plant.links
+    perturbed = build_scenario(ARM3, SQUARE).plant.links
+    for before, after, factor in zip(nominal, perturbed, (1.4, 1.4, 2.2), strict=True):
+        assert after.mass_kg == pytest.approx(factor * before.mass_kg)
+        assert after.com_m == pytest.approx(factor * before.com_m)
+        about_com = before.inertia_kg_m2 - before.mass_kg * before.com_m**2
+        assert after.inertia_kg_m2 - after.mass_kg * after.com_m**2 == pytest.approx(about_com)
+    # 2 - 5 (.5)^2 + 7 (.7)^2 = 4.18 and 1.3 - 4.2 (.4)^2 + 9.24 (.88)^2 = 7.783456 by hand.
+    assert perturbed[0].inertia_kg_m2 == pytest.approx(4.18)
+    assert perturbed[2].inertia_kg_m2 == pytest.approx(7.783456)
+
+
+def test_when_nothing_is_said_expect_the_disturbance_and_sensors_of_the_thesis() -> None:
+    scenario = build_scenario(ARM3, SQUARE)
+    terms = [(t.joint, t.amplitude_nm, t.frequency_rad_s, t.phase_rad) for t in scenario.external_torque]
+    assert terms == [(0, 450.0, 15.0, 0.0), (1, 375.0, 15.0, 0.0), (2, 300.0, 15.0, 0.0)]
+    assert (scenario.sensors.encoder_bits, scenario.sensors.velocity_noise_rad_s) == (20, 0.05)
+    assert scenario.transport_delay_s == 0.0
+    assert isinstance(scenario.integrator, IdaIntegrator)
+
+
+def test_when_a_scenario_is_built_twice_expect_the_same_noise_seed() -> None:
+    seeds = {build_scenario(ARM3, trajectory).sensors.seed for trajectory in TRAJECTORIES.values()}
+    assert len(seeds) == 1
+
+
+def test_when_robot_and_trajectory_have_different_joints_expect_input_error() -> None:
+    one_joint = Trajectory("still", np.array([0.0, 1.0]), np.zeros((1, 1, 6)))
+    with pytest.raises(InputError, match="still: joints: got 1, expected 3, as arm3 has"):
+        build_scenario(ARM3, one_joint)
+
+
+@pytest.mark.parametrize("integrator", [IdaIntegrator(), IdaIntegrator(relative_tolerance=1e-10), Rk4Integrator()])
+def test_when_a_scenario_is_written_expect_the_same_one_back(
+    integrator: IdaIntegrator | Rk4Integrator, tmp_path: Path
+) -> None:
+    scenario = build_scenario(
+        ARM3, SQUARE, sensors=Sensors(encoder_bits=17, seed=1), integrator=integrator, transport_delay_s=5e-4
+    )
+    assert read_scenario(write_scenario(tmp_path / "scenario.json", scenario)) == scenario
+
+
+def test_when_a_scenario_is_written_expect_exactly_the_members_the_format_documents() -> None:
+    table = FORMATS.read_text().split("## Scenario")[1]
+    documented = set(re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE))
+    assert set(build_scenario(ARM3, SQUARE).to_document()) == documented | {"schema", "schema_version"}
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        (lambda d: d.update(schema="quasilpv.artifact"), "schema"),
+        (lambda d: d.update(schema_version=2), "schema_version"),
+        (lambda d: d.update(comment="no"), "comment"),
+        (lambda d: d.update(duration_s=0), "duration_s"),
+        (lambda d: d["plant"].update(kind="five-bar"), "plant.kind"),
+        (lambda d: d["plant"].update(links=[]), "plant.links"),
+        (lambda d: d["plant"]["links"][1].update(mass_kg=-1), "plant.links[1].mass_kg"),
+        (lambda d: d["plant"]["links"][2].update(inertia_kg_m2=1.3), "plant.links[2].inertia_kg_m2"),
+        (lambda d: d["plant"]["links"][0].update(friction_nm_s=-0.1), "plant.links[0].friction_nm_s"),
+        (lambda d: d["integrator"].update(kind="euler"), "integrator"),
+        (lambda d: d["integrator"].update(relative_tolerance=0), "integrator.relative_tolerance"),
+        (lambda d: d.update(integrator={"kind": "rk4", "steps_per_sample": 2.5}), "integrator.steps_per_sample"),
+        (lambda d: d["external_torque"][2].update(joint=3), "external_torque[2].joint"),
+        (lambda d: d["external_torque"][0].update(amplitude_nm="450"), "external_torque[0].amplitude_nm"),
+        (lambda d: d["sensors"].update(encoder_bits=33), "sensors.encoder_bits"),
+        (lambda d: d["sensors"].update(seed=-1), "sensors.seed"),
+        (lambda d: d.update(transport_delay_s=-1e-3), "transport_delay_s"),
+        (lambda d: d["initial"].update(angle_rad=[0, 0]), "initial.angle_rad"),
+        (lambda d: d["initial"].pop("speed_rad_s"), "initial.speed_rad_s"),
+    ],
+)
+def test_when_a_scenario_breaks_a_rule_expect_one_line_with_its_field(change: Callable, field: str) -> None:
+    document = json.loads(json.dumps(build_scenario(ARM3, SQUARE).to_document()))
+    change(document)
+    with pytest.raises(InputError) as error:
+        Scenario.from_document(document, "scenario.json")
+    assert (error.value.source, error.value.field) == ("scenario.json", field)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("text", ['{"name": "a", "name": "b"}', '{"duration_s": NaN}', "[]", "", '{"name": '])
+def test_when_a_scenario_file_is_not_strict_json_expect_input_error_with_its_name(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "scenario.json"
+    path.write_text(text)
+    with pytest.raises(InputError) as error:
+        read_scenario(path)
+    assert error.value.source == str(path)
+
+
+@pytest.mark.parametrize(
+    ("path", "field"),
+    [
+        (("sensors", "seed"), "sensors.seed"),
+        (("integrator", "absolute_tolerance"), "integrator.absolute_tolerance"),
+        (("external_torque", 1, "phase_rad"), "external_torque[1].phase_rad"),
+    ],
+)
+def test_when_a_member_with_a_default_is_missing_in_a_file_expect_it_refused(path: tuple, field: str) -> None:
+    document = build_scenario(ARM3, SQUARE).to_document()
+    parent = document
+    for key in path[:-1]:
+        parent = parent[key]
+    del parent[path[-1]]
+    with pytest.raises(InputError, match="got nothing, expected this member") as error:
+        Scenario.from_document(document)
+    assert error.value.field == field
