@@ -1,0 +1,103 @@
+// What the command lines of both executables share. Only their main files include this (it needs CLI11).
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
+#include <iostream>
+#include <map>
+#include <string>
+
+#include "quasilpv/errors.hpp"
+#include "quasilpv/lcm_link.hpp"
+#include "quasilpv/pacer.hpp"
+#include "quasilpv/realtime.hpp"
+#include "quasilpv/run_report.hpp"
+
+namespace quasilpv {
+
+/// Options that mean the same on both sides of the wire.
+struct CommonOptions {
+  std::string artifact;
+  std::int64_t session = 0;
+  std::string url = kDefaultLcmUrl;
+  bool allow_network = false;
+  std::string record;
+  Pace pace = Pace::kLockStep;
+  int priority = 0;  ///< 0: normal scheduling
+  bool require_realtime = false;
+  double timeout_s = 10.0;
+  bool json = false;
+};
+
+inline void declare(CLI::App& app, CommonOptions& options) {
+  static const std::map<std::string, Pace> kPaces{{"lockstep", Pace::kLockStep}, {"realtime", Pace::kRealTime}};
+  app.add_option("--artifact", options.artifact, "the controller, JSON or CBOR")->required();
+  app.add_option("--session", options.session, "a number of your choice, the same on both sides")->required();
+  app.add_option("--url", options.url, "LCM address")->capture_default_str();
+  app.add_flag("--allow-network", options.allow_network, "accept a url with ttl > 0; messages are not authenticated");
+  app.add_option("--record", options.record, "write every sample to this CSV file");
+  app.add_option("--mode", options.pace, "lockstep (default) or realtime")
+      ->transform(CLI::CheckedTransformer(kPaces, CLI::ignore_case).description(""));
+  CLI::Option* priority =
+      app.add_option("--priority", options.priority, "lock memory and use SCHED_FIFO with this priority, 1..99")
+          ->check(CLI::Range(1, 99).description(""));
+  app.add_flag("--require-rt", options.require_realtime, "exit 4 if --priority cannot be had")->needs(priority);
+  app.add_option("--timeout-s", options.timeout_s, "end the run after so long without the other side")
+      ->check(CLI::PositiveNumber.description(""))
+      ->capture_default_str();
+  app.add_flag("--json", options.json, "report as one line of JSON");
+}
+
+/// No real-time privilege although it was required (exit code 4).
+class NoRealtime : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Enters real-time scheduling if `--priority` asks for it; true if all of it was granted. Warns once, or throws
+/// NoRealtime if it is required. INIT-ONLY: before any thread is created.
+inline bool apply_priority(const CLI::App& app, const CommonOptions& options) {
+  if (options.priority == 0) {
+    return false;
+  }
+  const RealtimeStatus status = enter_realtime(options.priority);
+  if (status.complete()) {
+    return true;
+  }
+  const std::string missing =
+      std::string(status.fifo ? "" : "SCHED_FIFO ") + (status.memory_locked ? "" : "mlockall ") +
+      "not permitted: needs CAP_SYS_NICE and CAP_IPC_LOCK, or rtprio and memlock in limits.conf";
+  if (options.require_realtime) {
+    throw NoRealtime(missing);
+  }
+  std::cerr << app.get_name() << ": warning: " << missing << "; running without\n";
+  return false;
+}
+
+/// Parses the command line and runs `body`; every error becomes one line on stderr and its exit code.
+inline int run_main(CLI::App& app, int argc, char** argv, const std::function<int()>& body) {
+  const auto fail = [&app](const char* what, ExitCode code) {
+    std::cerr << app.get_name() << ": " << what << '\n';
+    return static_cast<int>(code);
+  };
+  try {
+    app.parse(argc, argv);
+    return body();
+  } catch (const CLI::CallForHelp&) {
+    std::cout << app.help();
+    return kExitDone;
+  } catch (const CLI::ParseError& error) {
+    return fail(error.what(), kExitBadInput);
+  } catch (const InputError& error) {
+    return fail(error.what(), kExitBadInput);
+  } catch (const NoRealtime& error) {
+    return fail(error.what(), kExitNoRealtime);
+  } catch (const TransportError& error) {
+    return fail(error.what(), kExitNoTransport);
+  } catch (const PlantError& error) {
+    return fail(error.what(), kExitPlantFailure);
+  }
+}
+
+}  // namespace quasilpv

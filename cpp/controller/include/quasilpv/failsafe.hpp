@@ -1,0 +1,82 @@
+// The fail-safe policy: when to trust the law, when to warn, when to give up. Pure: no clock, no I/O, no memory of its
+// own.
+#pragma once
+
+#include <cstdint>
+
+namespace quasilpv {
+
+/// State of a controller, as telemetry and commands carry it.
+enum class ControllerState : std::int32_t {
+  kInit = 0,      ///< constructed, no transport yet
+  kReady = 1,     ///< waits for the first measurement
+  kRunning = 2,   ///< the law's torque, nothing to report
+  kDegraded = 3,  ///< the law's torque, while something is wrong that it can bridge
+  kFault = 4      ///< latched: the safe torque, until an explicit reset
+};
+
+/// Why a fault was latched (`event_v1::detail[0]` of EventCode::kFault).
+enum class FaultCause : std::int32_t {
+  kNone = 0,
+  kMeasurementLost = 1,    ///< too many consecutive invalid or missing measurements
+  kPlantSilent = 2,        ///< no measurement for too long (real time)
+  kDeadlineOverrun = 3,    ///< too many consecutive overruns
+  kForeignMessages = 4,    ///< too many consecutive messages of another session or artifact
+  kPremiseOutsideBox = 5,  ///< outside the operating domain for too long
+  kStopRequested = 6       ///< SIGINT or SIGTERM: a stop like a fault, but not an error
+};
+
+const char* to_string(ControllerState state) noexcept;
+const char* to_string(FaultCause cause) noexcept;
+
+/// When the policy gives up.
+struct FailsafeSettings {
+  std::int64_t invalid_limit = 20;                ///< fault at so many consecutive invalid or missing measurements
+  std::int64_t overrun_limit = 20;                ///< fault above so many consecutive overruns
+  std::int64_t foreign_limit = 100;               ///< fault at so many consecutive foreign messages
+  std::int64_t premise_degraded_ns = 20'000'000;  ///< degraded when outside the box for longer
+  std::int64_t premise_fault_ns = 1'000'000'000;  ///< fault when outside the box for longer; 0: never
+  std::int64_t ramp_ns = 40'000'000;              ///< from the last torque to the safe torque
+};
+
+/// What was observed at one sample. False and 0 are healthy.
+struct FailsafeFlags {
+  std::int64_t consecutive_invalid = 0;   ///< invalid or missing measurements up to this one
+  std::int64_t consecutive_overruns = 0;  ///< samples that took longer than their period, up to this one
+  std::int64_t consecutive_foreign = 0;   ///< messages of another session or artifact since the last good one
+  bool premise_outside_box = false;
+  bool law_invalid = false;  ///< torque or model not finite: the law kept its last torque
+  bool plant_silent = false;
+  bool stop_requested = false;
+};
+
+/// What the policy remembers from one sample to the next.
+struct FailsafeState {
+  ControllerState state = ControllerState::kReady;
+  FaultCause cause = FaultCause::kNone;
+  std::int64_t fault_since_ns = 0;
+  bool premise_outside_box = false;
+  std::int64_t outside_since_ns = 0;
+};
+
+/// What to do with the torque of this sample: (1 - safe_share) times the torque before the fault plus safe_share times
+/// the safe torque; 0 outside Fault, where the law's torque is used.
+struct FailsafeAction {
+  bool use_safe_torque = false;
+  double safe_share = 0.0;
+};
+
+/// One sample of the policy: (state, flags, clock) -> state.
+///
+/// Ready becomes Running at the first sample. Any flag makes Running Degraded; the first sample without one makes it
+/// Running again. The limits of `settings` make it Fault, with the first cause that applies, and Fault stays Fault:
+/// only a new FailsafeState leaves it. RT-SAFE (bounded, no allocation, no lock, no throw).
+///
+/// @param now_ns  any monotonic clock; simulated time in lock-step
+FailsafeState next_state(const FailsafeSettings& settings, const FailsafeState& state, const FailsafeFlags& flags,
+                         std::int64_t now_ns) noexcept;
+
+/// What `state` asks for at `now_ns`. RT-SAFE (bounded, no allocation, no lock, no throw).
+FailsafeAction action_of(const FailsafeSettings& settings, const FailsafeState& state, std::int64_t now_ns) noexcept;
+
+}  // namespace quasilpv

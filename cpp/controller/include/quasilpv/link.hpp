@@ -1,0 +1,104 @@
+// Controller and plant talk through a Link: LCM between two processes, queues within one.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "quasilpv/messages.hpp"
+
+namespace quasilpv {
+
+/// What a link received and what it refused; every packet is counted exactly once among the first eight.
+struct LinkCounters {
+  std::int64_t accepted = 0;
+  std::int64_t duplicates = 0;  ///< the newest sequence number once more
+  std::int64_t old = 0;         ///< a lower sequence number than the newest
+  std::int64_t wrong_length = 0;
+  std::int64_t wrong_checksum = 0;
+  std::int64_t wrong_type = 0;
+  std::int64_t wrong_session = 0;
+  std::int64_t wrong_artifact = 0;     ///< hash or number of joints differ
+  std::int64_t consecutive_wrong = 0;  ///< packets of a wrong session or artifact since the last accepted one
+  std::int64_t superseded = 0;         ///< accepted, but a newer one arrived before it was taken
+  std::int64_t send_failures = 0;
+};
+
+/// One end of the wire.
+///
+/// Sending stamps and seals a message; receiving drains everything that is pending and keeps, per type, the message
+/// with the highest sequence number: a queue that holds the *oldest* message back would add its age to the loop delay.
+/// What is not ours (decode()) is dropped and counted. Transports implement transmit() and drain(), nothing else. One
+/// thread per link: no member may be called concurrently with another.
+class Link {
+ public:
+  virtual ~Link() = default;
+  Link(const Link&) = delete;
+  Link& operator=(const Link&) = delete;
+
+  /// Fills utime, session, artifact_hash, joints and crc of a copy of the message and hands it to the transport; a
+  /// failure is counted. RT-UNSAFE (system call); allocates nothing itself and never throws.
+  void send(const measurement_v1& message) noexcept;
+  void send(const command_v1& message) noexcept;
+  void send(const telemetry_v1& message) noexcept;
+  void send(EventCode code, std::int64_t seq, std::int64_t detail = 0) noexcept;
+
+  /// Waits until at least one packet arrived or `timeout_ns` passed (0: polls), then drains all. RT-UNSAFE (system
+  /// call). Returns false if nothing arrived.
+  bool receive(std::int64_t timeout_ns) noexcept;
+
+  /// Takes the newest message out, true if there is one that was not taken yet. A duplicate of the newest message can
+  /// be taken again: lock-step answers it. RT-SAFE.
+  bool take(measurement_v1& message) noexcept { return measurement_.take(message); }
+  bool take(command_v1& message) noexcept { return command_.take(message); }
+  bool take(event_v1& message) noexcept { return event_.take(message); }
+
+  const LinkCounters& counters() const noexcept { return counters_; }
+  const WireIdentity& identity() const noexcept { return identity_; }
+  Side side() const noexcept { return side_; }
+
+ protected:
+  Link(Side side, const WireIdentity& identity) noexcept : side_(side), identity_(identity) {}
+
+  virtual bool transmit(Channel channel, const void* bytes, std::size_t size) noexcept = 0;
+  /// Waits as receive() does and calls accept() for each packet.
+  virtual bool drain(std::int64_t timeout_ns) noexcept = 0;
+
+  /// Judges one packet. RT-SAFE (bounded, no allocation, no lock, no throw).
+  void accept(Channel channel, const void* bytes, std::size_t size) noexcept;
+
+ private:
+  template <class Message>
+  struct Inbox {
+    bool take(Message& message) noexcept {
+      const bool taken = fresh;
+      if (fresh) {
+        message = newest;
+        fresh = false;
+      }
+      return taken;
+    }
+
+    Message newest{};
+    std::int64_t newest_seq = -1;
+    bool fresh = false;
+  };
+
+  template <class Message>
+  void seal_and_transmit(Message message) noexcept;
+  template <class Message>
+  void accept_into(Inbox<Message>& inbox, const void* bytes, std::size_t size) noexcept;
+  template <class Message>
+  void file(Inbox<Message>& inbox, const Message& message) noexcept;
+  void accept_event(const void* bytes, std::size_t size) noexcept;
+  bool count(DecodeStatus status) noexcept;
+
+  Side side_;
+  WireIdentity identity_;
+  LinkCounters counters_;
+  Inbox<measurement_v1> measurement_;
+  Inbox<command_v1> command_;
+  Inbox<event_v1> event_;
+  Packet packet_;
+};
+
+}  // namespace quasilpv

@@ -1,0 +1,76 @@
+// The wire: what is common to all messages, how they are sealed, and what makes one acceptable. Format and channels:
+// docs/reference/messages.md
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "quasilpv/command_v1.hpp"
+#include "quasilpv/event_v1.hpp"
+#include "quasilpv/measurement_v1.hpp"
+#include "quasilpv/step.hpp"
+#include "quasilpv/telemetry_v1.hpp"
+
+namespace quasilpv {
+
+/// No message is longer: it fits one Ethernet frame, so LCM never fragments it.
+inline constexpr std::size_t kMaxMessageBytes = 1400;
+
+enum class Channel : std::uint8_t { kMeasurement, kCommand, kTelemetry, kEvent };
+inline constexpr int kChannels = 4;
+
+/// LCM channel name. RT-SAFE.
+const char* channel_name(Channel channel) noexcept;
+
+/// Channel a message type travels on.
+constexpr Channel channel_of(const measurement_v1& /*type*/) noexcept { return Channel::kMeasurement; }
+constexpr Channel channel_of(const command_v1& /*type*/) noexcept { return Channel::kCommand; }
+constexpr Channel channel_of(const telemetry_v1& /*type*/) noexcept { return Channel::kTelemetry; }
+constexpr Channel channel_of(const event_v1& /*type*/) noexcept { return Channel::kEvent; }
+
+/// Who sent an event (`event_v1::source`).
+enum class Side : std::int32_t { kController = 1, kPlant = 2 };
+
+/// What happened (`event_v1::code`).
+enum class EventCode : std::int32_t {
+  kStarted = 1,  ///< the sender entered its loop
+  kEnded = 2,    ///< the run is over: from the plant after its last sample, from the controller when it stops
+  kFault = 3     ///< the controller latched a fault; detail[0] is its FaultCause
+};
+
+/// Whose messages these are. A message of another session, artifact or number of joints is ignored and counted.
+struct WireIdentity {
+  std::int64_t session = 0;        ///< chosen by who starts the run
+  std::int64_t artifact_hash = 0;  ///< Artifact::hash_prefix()
+  int joints = 0;
+};
+
+/// Outcome of decoding one packet.
+enum class DecodeStatus : std::uint8_t {
+  kAccepted,
+  kWrongLength,
+  kWrongChecksum,
+  kWrongType,
+  kWrongSession,
+  kWrongArtifact
+};
+
+/// Encoded message in a buffer of its own: nothing is allocated.
+struct Packet {
+  std::array<std::uint8_t, kMaxMessageBytes> bytes;
+  int size = 0;
+};
+
+/// Encodes `message` and writes the checksum of all preceding bytes into its last field. RT-SAFE (bounded, no
+/// allocation, no lock, no throw). Message is one of the four types above.
+template <class Message>
+void encode(const Message& message, Packet& packet) noexcept;
+
+/// Decodes a packet that must have the exact length of its type (LCM's own decoder accepts trailing bytes), the right
+/// checksum and fingerprint, and `identity`. `message` is written only if the result is kAccepted. RT-SAFE (bounded, no
+/// allocation, no lock, no throw).
+template <class Message>
+DecodeStatus decode(const void* bytes, std::size_t size, const WireIdentity& identity, Message& message) noexcept;
+
+}  // namespace quasilpv

@@ -1,0 +1,40 @@
+// What the loop asks of the operating system: a clock, a sleep, memory that stays, a priority, a polite stop.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+namespace quasilpv {
+
+inline constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
+inline constexpr std::int64_t kNanosecondsPerMillisecond = 1'000'000;
+
+/// Seconds as whole nanoseconds, rounded to nearest. RT-SAFE.
+std::int64_t to_nanoseconds(double seconds) noexcept;
+
+/// CLOCK_MONOTONIC, ns: steps of the wall clock have no effect on it, and all processes of a machine share it. RT-SAFE.
+std::int64_t monotonic_ns() noexcept;
+
+/// Sleeps until monotonic_ns() >= `deadline_ns`; returns at once if it has passed, earlier if a signal arrives. RT-SAFE
+/// in the sense that blocking is its purpose.
+void sleep_until(std::int64_t deadline_ns) noexcept;
+
+/// Outcome of enter_realtime().
+struct RealtimeStatus {
+  bool memory_locked = false;
+  bool fifo = false;
+
+  bool complete() const noexcept { return memory_locked && fifo; }
+};
+
+/// Locks all present and future memory and puts the calling thread, and the threads it creates from then on, into
+/// SCHED_FIFO with the given priority (1..99). INIT-ONLY. Without the privilege the status says so; nothing is thrown.
+RealtimeStatus enter_realtime(int priority) noexcept;
+
+/// Takes the calling thread back to normal scheduling. INIT-ONLY.
+void leave_realtime() noexcept;
+
+/// Set by SIGINT and SIGTERM once the handlers are installed, which interrupt a sleep or a wait. INIT-ONLY.
+const std::atomic<bool>& install_stop_signals() noexcept;
+
+}  // namespace quasilpv

@@ -1,0 +1,53 @@
+// The controller's side of a run: waits, answers, gives up in time.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "quasilpv/latency_histogram.hpp"
+#include "quasilpv/link.hpp"
+#include "quasilpv/loop.hpp"
+#include "quasilpv/pacer.hpp"
+#include "quasilpv/telemetry_publisher.hpp"
+
+namespace quasilpv {
+
+struct ControllerRunSettings {
+  Pace pace = Pace::kLockStep;
+  double timeout_s = 10.0;     ///< without any measurement: end of the run
+  double silence_s = 0.02;     ///< real time: without a measurement after the first: fault
+  bool exit_on_fault = false;  ///< end the run once the safe torque is reached
+};
+
+/// How a run ended.
+enum class ControllerRunEnd {
+  kPlantEnded,      ///< the plant said so
+  kStopped,         ///< SIGINT or SIGTERM; the safe torque was sent
+  kFault,           ///< `exit_on_fault`
+  kPlantSilent,     ///< no measurement for `timeout_s`
+  kPlantNeverHeard  ///< no measurement at all
+};
+
+const char* to_string(ControllerRunEnd end) noexcept;
+
+struct ControllerRunReport {
+  ControllerRunEnd end = ControllerRunEnd::kPlantNeverHeard;
+  std::int64_t commands = 0;           ///< sent, repeated ones included
+  std::int64_t repeated = 0;           ///< lock-step: answered again
+  std::int64_t deadline_overruns = 0;  ///< real time: answered later than one period after its arrival
+  LatencyHistogram arrival;            ///< measurement sent (plant's clock) to wake-up; meaningful on one machine only
+  LatencyHistogram response;           ///< wake-up to command sent
+};
+
+/// Answers measurements until the run ends. Lock-step: one command per measurement, the same one again for a repeated
+/// measurement. Real time: the newest measurement only, never two commands for one measurement; when the plant has been
+/// silent for `silence_s`, a latched fault and the safe torque on the grid of the sample period. A stop request ramps
+/// to the safe torque, for at most 100 ms, and ends the run. No wait is longer than 10 ms. Never throws; the control
+/// path (handle, send, push) allocates nothing.
+///
+/// @param ring  telemetry of every answered sample; may be null
+/// @param stop  set by a signal handler or another thread
+ControllerRunReport run_controller(ControlLoop& loop, Link& link, TelemetryPublisher::Ring* ring,
+                                   const ControllerRunSettings& settings, const std::atomic<bool>& stop) noexcept;
+
+}  // namespace quasilpv

@@ -1,0 +1,31 @@
+// What both executables print at the end of a run.
+#pragma once
+
+#include <ostream>
+
+#include "quasilpv/document.hpp"
+#include "quasilpv/latency_histogram.hpp"
+#include "quasilpv/link.hpp"
+
+namespace quasilpv {
+
+/// Exit codes of both executables.
+enum ExitCode : int {
+  kExitDone = 0,
+  kExitBadInput = 2,
+  kExitFaultStop = 3,
+  kExitNoRealtime = 4,
+  kExitNoTransport = 5,
+  kExitPlantFailure = 6
+};
+
+/// `{count, p50, p99, p99_9, max}` in ns; null where there is nothing to say. RT-UNSAFE, as all here.
+Json to_json(const LatencyHistogram& histogram);
+
+/// One member per counter.
+Json to_json(const LinkCounters& counters);
+
+/// One line of JSON, or a table of two columns: path of the member, value.
+void print_report(std::ostream& out, const Json& report, bool as_json);
+
+}  // namespace quasilpv

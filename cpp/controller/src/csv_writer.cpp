@@ -1,0 +1,70 @@
+#include "quasilpv/csv_writer.hpp"
+
+#include <array>
+#include <charconv>
+#include <cstring>
+
+#include "quasilpv/errors.hpp"
+
+namespace quasilpv {
+namespace {
+
+template <class Number>
+void append_number(std::string& row, Number value) {
+  std::array<char, 32> digits{};  // the longest shortest double has 24 characters, the longest integer 20
+  const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value);
+  static_cast<void>(error);
+  row.append(digits.data(), end);
+}
+
+}  // namespace
+
+CsvWriter::CsvWriter(const std::string& path) : file_(path, std::ios::binary | std::ios::trunc) {
+  if (!file_) {
+    throw InputError(path, "record", std::strerror(errno), "a file that can be written");
+  }
+}
+
+void CsvWriter::head(const std::string& name, int width) {
+  for (int i = 0; i < width; ++i) {
+    separate();
+    row_ += width > 1 ? name + "_" + std::to_string(i) : name;
+  }
+}
+
+void CsvWriter::add(double value) {
+  separate();
+  append_number(row_, value);
+}
+
+void CsvWriter::add(std::int64_t value) {
+  separate();
+  append_number(row_, value);
+}
+
+void CsvWriter::add(const double* values, int count) {
+  for (int i = 0; i < count; ++i) {
+    add(values[i]);
+  }
+}
+
+bool CsvWriter::end_row() {
+  row_ += '\n';
+  file_.write(row_.data(), static_cast<std::streamsize>(row_.size()));
+  row_.clear();
+  return file_.good();
+}
+
+bool CsvWriter::close() {
+  const bool healthy = file_.good();
+  file_.close();
+  return healthy && file_.good();
+}
+
+void CsvWriter::separate() {
+  if (!row_.empty()) {
+    row_ += ',';
+  }
+}
+
+}  // namespace quasilpv

@@ -1,0 +1,102 @@
+#include "quasilpv/failsafe.hpp"
+
+#include <algorithm>
+
+namespace quasilpv {
+namespace {
+
+FaultCause fault_cause(const FailsafeSettings& settings, const FailsafeFlags& flags, std::int64_t outside_ns) noexcept {
+  if (flags.stop_requested) {
+    return FaultCause::kStopRequested;
+  }
+  if (flags.plant_silent) {
+    return FaultCause::kPlantSilent;
+  }
+  if (flags.consecutive_invalid >= settings.invalid_limit) {
+    return FaultCause::kMeasurementLost;
+  }
+  if (flags.consecutive_overruns > settings.overrun_limit) {
+    return FaultCause::kDeadlineOverrun;
+  }
+  if (flags.consecutive_foreign >= settings.foreign_limit) {
+    return FaultCause::kForeignMessages;
+  }
+  if (settings.premise_fault_ns > 0 && outside_ns > settings.premise_fault_ns) {
+    return FaultCause::kPremiseOutsideBox;
+  }
+  return FaultCause::kNone;
+}
+
+}  // namespace
+
+const char* to_string(ControllerState state) noexcept {
+  switch (state) {
+    case ControllerState::kInit:
+      return "init";
+    case ControllerState::kReady:
+      return "ready";
+    case ControllerState::kRunning:
+      return "running";
+    case ControllerState::kDegraded:
+      return "degraded";
+    case ControllerState::kFault:
+      return "fault";
+  }
+  return "unknown";
+}
+
+const char* to_string(FaultCause cause) noexcept {
+  switch (cause) {
+    case FaultCause::kNone:
+      return "none";
+    case FaultCause::kMeasurementLost:
+      return "measurement lost";
+    case FaultCause::kPlantSilent:
+      return "plant silent";
+    case FaultCause::kDeadlineOverrun:
+      return "deadline overrun";
+    case FaultCause::kForeignMessages:
+      return "foreign messages";
+    case FaultCause::kPremiseOutsideBox:
+      return "premise outside its box";
+    case FaultCause::kStopRequested:
+      return "stop requested";
+  }
+  return "unknown";
+}
+
+FailsafeState next_state(const FailsafeSettings& settings, const FailsafeState& state, const FailsafeFlags& flags,
+                         std::int64_t now_ns) noexcept {
+  FailsafeState next = state;
+  if (flags.premise_outside_box && !state.premise_outside_box) {
+    next.outside_since_ns = now_ns;
+  }
+  next.premise_outside_box = flags.premise_outside_box;
+  if (state.state == ControllerState::kFault) {
+    return next;
+  }
+  const std::int64_t outside_ns = flags.premise_outside_box ? now_ns - next.outside_since_ns : 0;
+  next.cause = fault_cause(settings, flags, outside_ns);
+  if (next.cause != FaultCause::kNone) {
+    next.state = ControllerState::kFault;
+    next.fault_since_ns = now_ns;
+    return next;
+  }
+  const bool degraded = flags.consecutive_invalid > 0 || flags.consecutive_overruns > 0 ||
+                        flags.consecutive_foreign > 0 || flags.law_invalid || outside_ns > settings.premise_degraded_ns;
+  next.state = degraded ? ControllerState::kDegraded : ControllerState::kRunning;
+  return next;
+}
+
+FailsafeAction action_of(const FailsafeSettings& settings, const FailsafeState& state, std::int64_t now_ns) noexcept {
+  if (state.state != ControllerState::kFault) {
+    return {};
+  }
+  const std::int64_t elapsed_ns = now_ns - state.fault_since_ns;
+  if (elapsed_ns >= settings.ramp_ns) {
+    return {true, 1.0};
+  }
+  return {true, static_cast<double>(std::max<std::int64_t>(elapsed_ns, 0)) / static_cast<double>(settings.ramp_ns)};
+}
+
+}  // namespace quasilpv

@@ -1,0 +1,120 @@
+#include "quasilpv/link.hpp"
+
+#include <type_traits>
+
+#include "quasilpv/realtime.hpp"
+
+namespace quasilpv {
+
+void Link::send(const measurement_v1& message) noexcept { seal_and_transmit(message); }
+void Link::send(const command_v1& message) noexcept { seal_and_transmit(message); }
+void Link::send(const telemetry_v1& message) noexcept { seal_and_transmit(message); }
+
+void Link::send(EventCode code, std::int64_t seq, std::int64_t detail) noexcept {
+  event_v1 event{};
+  event.seq = seq;
+  event.source = static_cast<std::int32_t>(side_);
+  event.code = static_cast<std::int32_t>(code);
+  event.detail[0] = detail;
+  seal_and_transmit(event);
+}
+
+bool Link::receive(std::int64_t timeout_ns) noexcept { return drain(timeout_ns); }
+
+template <class Message>
+void Link::seal_and_transmit(Message message) noexcept {
+  constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
+  message.utime = monotonic_ns() / kNanosecondsPerMicrosecond;
+  message.session = identity_.session;
+  message.artifact_hash = identity_.artifact_hash;
+  if constexpr (!std::is_same_v<Message, event_v1>) {
+    message.joints = identity_.joints;
+  }
+  encode(message, packet_);
+  if (!transmit(channel_of(message), packet_.bytes.data(), static_cast<std::size_t>(packet_.size))) {
+    ++counters_.send_failures;
+  }
+}
+
+void Link::accept(Channel channel, const void* bytes, std::size_t size) noexcept {
+  switch (channel) {
+    case Channel::kMeasurement:
+      accept_into(measurement_, bytes, size);
+      break;
+    case Channel::kCommand:
+      accept_into(command_, bytes, size);
+      break;
+    case Channel::kEvent:
+      accept_event(bytes, size);
+      break;
+    case Channel::kTelemetry:
+      break;  // neither side listens to it
+  }
+}
+
+template <class Message>
+void Link::accept_into(Inbox<Message>& inbox, const void* bytes, std::size_t size) noexcept {
+  Message message;
+  if (count(decode(bytes, size, identity_, message))) {
+    file(inbox, message);
+  }
+}
+
+void Link::accept_event(const void* bytes, std::size_t size) noexcept {
+  event_v1 event;
+  const DecodeStatus status = decode(bytes, size, identity_, event);
+  // Both sides send on the channel of events, and multicast hands every sender its own packets back.
+  if (status == DecodeStatus::kAccepted && event.source == static_cast<std::int32_t>(side_)) {
+    return;
+  }
+  if (count(status)) {
+    // Events are rare and carry the sample index: several of one sample are not duplicates of each other.
+    ++counters_.accepted;
+    event_.newest = event;
+    event_.fresh = true;
+  }
+}
+
+bool Link::count(DecodeStatus status) noexcept {
+  switch (status) {
+    case DecodeStatus::kAccepted:
+      counters_.consecutive_wrong = 0;
+      return true;
+    case DecodeStatus::kWrongLength:
+      ++counters_.wrong_length;
+      return false;
+    case DecodeStatus::kWrongChecksum:
+      ++counters_.wrong_checksum;
+      return false;
+    case DecodeStatus::kWrongType:
+      ++counters_.wrong_type;
+      return false;
+    case DecodeStatus::kWrongSession:
+      ++counters_.wrong_session;
+      break;
+    case DecodeStatus::kWrongArtifact:
+      ++counters_.wrong_artifact;
+      break;
+  }
+  ++counters_.consecutive_wrong;
+  return false;
+}
+
+template <class Message>
+void Link::file(Inbox<Message>& inbox, const Message& message) noexcept {
+  if (message.seq < inbox.newest_seq) {
+    ++counters_.old;
+    return;
+  }
+  if (message.seq == inbox.newest_seq) {
+    ++counters_.duplicates;
+  } else {
+    ++counters_.accepted;
+    counters_.superseded += inbox.fresh ? 1 : 0;
+    inbox.newest = message;
+    inbox.newest_seq = message.seq;
+  }
+  inbox.fresh = true;
+}
+
+}  // namespace quasilpv

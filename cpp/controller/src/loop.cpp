@@ -1,0 +1,146 @@
+#include "quasilpv/loop.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "quasilpv/errors.hpp"
+#include "quasilpv/realtime.hpp"
+
+namespace quasilpv {
+namespace {
+
+int premises_of(const Artifact& artifact) {
+  return std::visit([](const auto& law) { return law.model.premises.outputs(); }, artifact.law());
+}
+
+void copy(const JointArray& source, double (&target)[kMaxJoints]) noexcept {
+  std::copy(source.begin(), source.end(), target);
+}
+
+JointArray to_array(const double (&source)[kMaxJoints]) noexcept {
+  JointArray target;
+  std::copy(std::begin(source), std::end(source), target.begin());
+  return target;
+}
+
+}  // namespace
+
+ControlLoop::ControlLoop(const Artifact& artifact, const Trajectory& trajectory, const LoopSettings& settings)
+    : controller_(artifact),
+      trajectory_(trajectory),
+      settings_(settings),
+      safe_torque_(artifact, settings.safe_action) {
+  if (trajectory.joints() != artifact.joints()) {
+    throw InputError("trajectory '" + trajectory.name() + "'", "joints", std::to_string(trajectory.joints()),
+                     std::to_string(artifact.joints()) + " as in artifact '" + artifact.name() + "'");
+  }
+  telemetry_.premises = premises_of(artifact);
+  telemetry_.realtime = settings.realtime ? 1 : 0;
+}
+
+void ControlLoop::handle(const measurement_v1& measurement, const SampleConditions& conditions) noexcept {
+  if (started()) {
+    predict_missing(measurement.seq, conditions);
+  }
+  StepInput input;
+  input.seq = measurement.seq;
+  input.angle = to_array(measurement.angle_rad);
+  input.speed = to_array(measurement.speed_rad_s);
+  step(input, conditions, false);
+}
+
+void ControlLoop::handle_silence(const SampleConditions& conditions) noexcept {
+  StepInput input;
+  input.seq = last_seq_ + 1;
+  input.valid = false;
+  step(input, conditions, true);
+}
+
+void ControlLoop::predict_missing(std::int64_t next_seq, const SampleConditions& conditions) noexcept {
+  // So many missing samples latch a fault: predicting more of them would only delay the answer.
+  const std::int64_t missing = next_seq - last_seq_ - 1;
+  const std::int64_t predicted = std::min(missing, settings_.failsafe.invalid_limit);
+  const std::int64_t first = last_seq_ + 1;
+  for (std::int64_t i = 0; i < predicted; ++i) {
+    StepInput input;
+    input.seq = first + i;
+    input.valid = false;
+    step(input, conditions, false);
+  }
+}
+
+void ControlLoop::step(const StepInput& sample, const SampleConditions& conditions, bool plant_silent) noexcept {
+  StepInput input = sample;
+  const std::int64_t start_ns = monotonic_ns();
+  input.reference = trajectory_.evaluate(static_cast<double>(input.seq) * sample_period_s());
+  const StepReport report = controller_.step(input);
+  const std::int64_t step_ns = monotonic_ns() - start_ns;
+
+  step_time_.add(step_ns);
+  flags_ |= report.flags;
+  last_seq_ = input.seq;
+  if ((report.flags & kMeasurementInvalid) != 0) {
+    ++consecutive_invalid_;
+    predicted_steps_ += 1;
+  } else {
+    consecutive_invalid_ = 0;
+    last_valid_angle_ = input.angle;
+  }
+  judge(report, conditions, plant_silent);
+  write_command(report, input, conditions.now_ns);
+  write_telemetry(input, report, step_ns);
+}
+
+void ControlLoop::judge(const StepReport& report, const SampleConditions& conditions, bool plant_silent) noexcept {
+  FailsafeFlags observed;
+  observed.consecutive_invalid = consecutive_invalid_;
+  observed.consecutive_overruns = conditions.consecutive_overruns;
+  observed.consecutive_foreign = conditions.consecutive_foreign;
+  observed.premise_outside_box = (report.flags & kPremiseOutsideBox) != 0;
+  observed.law_invalid = (report.flags & (kTorqueNotFinite | kModelInvalid)) != 0;
+  observed.plant_silent = plant_silent;
+  observed.stop_requested = conditions.stop_requested;
+  const bool was_fault = failsafe_.state == ControllerState::kFault;
+  failsafe_ = next_state(settings_.failsafe, failsafe_, observed, conditions.now_ns);
+  if (!was_fault && failsafe_.state == ControllerState::kFault) {
+    torque_at_fault_ = last_torque_;
+  }
+}
+
+bool ControlLoop::is_safe(std::int64_t now_ns) const noexcept {
+  const FailsafeAction action = action_of(settings_.failsafe, failsafe_, now_ns);
+  return action.use_safe_torque && action.safe_share >= 1.0;
+}
+
+void ControlLoop::write_command(const StepReport& report, const StepInput& input, std::int64_t now_ns) noexcept {
+  const FailsafeAction action = action_of(settings_.failsafe, failsafe_, now_ns);
+  last_torque_ = action.use_safe_torque ? safe_torque_.apply(action.safe_share, torque_at_fault_, last_torque_,
+                                                             last_valid_angle_, input.speed)
+                                        : report.torque_applied;
+  command_.seq = input.seq;
+  command_.state = static_cast<std::int32_t>(failsafe_.state);
+  command_.flags = static_cast<std::int32_t>(report.flags);
+  copy(last_torque_, command_.torque_nm);
+}
+
+void ControlLoop::write_telemetry(const StepInput& input, const StepReport& report, std::int64_t step_ns) noexcept {
+  telemetry_.seq = input.seq;
+  telemetry_.state = static_cast<std::int32_t>(failsafe_.state);
+  telemetry_.flags = static_cast<std::int32_t>(report.flags);
+  telemetry_.step_ns = step_ns;
+  copy(input.reference.angle, telemetry_.reference_angle_rad);
+  copy(input.reference.speed, telemetry_.reference_speed_rad_s);
+  copy(input.reference.acceleration, telemetry_.reference_acceleration_rad_s2);
+  copy(input.angle, telemetry_.measured_angle_rad);
+  copy(input.speed, telemetry_.measured_speed_rad_s);
+  copy(report.estimated_angle, telemetry_.estimated_angle_rad);
+  copy(report.estimated_speed, telemetry_.estimated_speed_rad_s);
+  copy(report.estimated_disturbance, telemetry_.estimated_disturbance);
+  copy(report.filtered_disturbance, telemetry_.filtered_disturbance);
+  copy(report.integral_error, telemetry_.integral_error_rad_s);
+  copy(report.torque_commanded, telemetry_.commanded_torque_nm);
+  copy(last_torque_, telemetry_.applied_torque_nm);
+  std::copy(report.premise.begin(), report.premise.end(), telemetry_.premise);
+}
+
+}  // namespace quasilpv

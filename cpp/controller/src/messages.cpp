@@ -1,0 +1,89 @@
+#include "quasilpv/messages.hpp"
+
+#include <type_traits>
+
+#include "quasilpv/crc32.hpp"
+
+namespace quasilpv {
+namespace {
+
+constexpr std::size_t kChecksumBytes = 8;
+
+/// All fields have a fixed size, so the encoded size does not depend on the values.
+template <class Message>
+std::size_t encoded_size() noexcept {
+  return static_cast<std::size_t>(Message{}.getEncodedSize());
+}
+
+std::int64_t read_big_endian(const std::uint8_t* bytes) noexcept {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < sizeof(value); ++i) {
+    value = (value << 8) | bytes[i];
+  }
+  return static_cast<std::int64_t>(value);
+}
+
+void write_big_endian(std::uint64_t value, std::uint8_t* bytes) noexcept {
+  for (std::size_t i = sizeof(value); i-- > 0; value >>= 8) {
+    bytes[i] = static_cast<std::uint8_t>(value & 0xFFu);
+  }
+}
+
+template <class Message>
+bool joints_agree(const Message& message, const WireIdentity& identity) noexcept {
+  if constexpr (std::is_same_v<Message, event_v1>) {
+    return true;
+  } else {
+    return message.joints == identity.joints;
+  }
+}
+
+}  // namespace
+
+const char* channel_name(Channel channel) noexcept {
+  static constexpr std::array<const char*, kChannels> kNames = {"QLPV_MEASUREMENT", "QLPV_COMMAND", "QLPV_TELEMETRY",
+                                                                "QLPV_EVENT"};
+  return kNames[static_cast<std::size_t>(channel)];
+}
+
+template <class Message>
+void encode(const Message& message, Packet& packet) noexcept {
+  packet.size = message.encode(packet.bytes.data(), 0, static_cast<int>(packet.bytes.size()));
+  const std::size_t checked = static_cast<std::size_t>(packet.size) - kChecksumBytes;
+  write_big_endian(crc32(packet.bytes.data(), checked), packet.bytes.data() + checked);
+}
+
+template <class Message>
+DecodeStatus decode(const void* bytes, std::size_t size, const WireIdentity& identity, Message& message) noexcept {
+  if (size != encoded_size<Message>()) {
+    return DecodeStatus::kWrongLength;
+  }
+  const auto* data = static_cast<const std::uint8_t*>(bytes);
+  const std::size_t checked = size - kChecksumBytes;
+  if (read_big_endian(data + checked) != static_cast<std::int64_t>(crc32(data, checked))) {
+    return DecodeStatus::kWrongChecksum;
+  }
+  Message candidate;
+  if (candidate.decode(data, 0, static_cast<int>(size)) < 0) {
+    return DecodeStatus::kWrongType;
+  }
+  if (candidate.session != identity.session) {
+    return DecodeStatus::kWrongSession;
+  }
+  if (candidate.artifact_hash != identity.artifact_hash || !joints_agree(candidate, identity)) {
+    return DecodeStatus::kWrongArtifact;
+  }
+  message = candidate;
+  return DecodeStatus::kAccepted;
+}
+
+template void encode(const measurement_v1&, Packet&) noexcept;
+template void encode(const command_v1&, Packet&) noexcept;
+template void encode(const telemetry_v1&, Packet&) noexcept;
+template void encode(const event_v1&, Packet&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, measurement_v1&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, command_v1&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, telemetry_v1&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, event_v1&) noexcept;
+
+}  // namespace quasilpv

@@ -1,0 +1,61 @@
+#include "quasilpv/realtime.hpp"
+
+#include <sched.h>
+#include <sys/mman.h>
+
+#include <cmath>
+#include <csignal>
+#include <ctime>
+
+namespace quasilpv {
+namespace {
+
+std::atomic<bool> g_stop_requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only touch lock-free atomics");
+
+extern "C" void request_stop(int /*signal*/) { g_stop_requested.store(true, std::memory_order_relaxed); }
+
+}  // namespace
+
+std::int64_t to_nanoseconds(double seconds) noexcept {
+  return std::llround(seconds * static_cast<double>(kNanosecondsPerSecond));
+}
+
+std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * kNanosecondsPerSecond + now.tv_nsec;
+}
+
+void sleep_until(std::int64_t deadline_ns) noexcept {
+  timespec deadline{};
+  deadline.tv_sec = deadline_ns / kNanosecondsPerSecond;
+  deadline.tv_nsec = deadline_ns % kNanosecondsPerSecond;
+  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr);
+}
+
+RealtimeStatus enter_realtime(int priority) noexcept {
+  RealtimeStatus status;
+  status.memory_locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+  sched_param parameters{};
+  parameters.sched_priority = priority;
+  status.fifo = sched_setscheduler(0, SCHED_FIFO, &parameters) == 0;
+  return status;
+}
+
+void leave_realtime() noexcept {
+  const sched_param parameters{};
+  sched_setscheduler(0, SCHED_OTHER, &parameters);
+}
+
+const std::atomic<bool>& install_stop_signals() noexcept {
+  // Without SA_RESTART a blocking wait returns, so that the loop sees the request at once.
+  struct sigaction action {};
+  action.sa_handler = request_stop;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  return g_stop_requested;
+}
+
+}  // namespace quasilpv

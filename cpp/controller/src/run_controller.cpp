@@ -1,0 +1,178 @@
+#include "quasilpv/run_controller.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "quasilpv/realtime.hpp"
+
+namespace quasilpv {
+namespace {
+
+constexpr std::int64_t kLongestWaitNs = 10 * kNanosecondsPerMillisecond;
+constexpr std::int64_t kLongestStopNs = 100 * kNanosecondsPerMillisecond;
+constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
+
+class ControllerRun {
+ public:
+  ControllerRun(ControlLoop& loop, Link& link, TelemetryPublisher::Ring* ring, const ControllerRunSettings& settings)
+      : loop_(loop),
+        link_(link),
+        ring_(ring),
+        settings_(settings),
+        period_ns_(to_nanoseconds(loop.sample_period_s())),
+        silence_ns_(to_nanoseconds(settings.silence_s)),
+        timeout_ns_(to_nanoseconds(settings.timeout_s)),
+        last_heard_ns_(monotonic_ns()) {}
+
+  ControllerRunReport run(const std::atomic<bool>& stop) noexcept {
+    link_.send(EventCode::kStarted, 0);
+    std::optional<ControllerRunEnd> end;
+    while (!end) {
+      link_.receive(wait_ns());
+      now_ns_ = monotonic_ns();
+      if (stop.load(std::memory_order_relaxed) && !stop_since_ns_) {
+        stop_since_ns_ = now_ns_;
+      }
+      answer_newest();
+      answer_silence();
+      end = find_end();
+    }
+    link_.send(EventCode::kEnded, loop_.last_seq());
+    report_.end = *end;
+    return report_;
+  }
+
+ private:
+  bool is_real_time() const noexcept { return settings_.pace == Pace::kRealTime; }
+
+  // Simulated time in lock-step: the fail-safe policy must not depend on how fast this machine is.
+  std::int64_t policy_clock(std::int64_t seq) const noexcept { return is_real_time() ? now_ns_ : seq * period_ns_; }
+
+  SampleConditions conditions(std::int64_t seq) const noexcept {
+    return {policy_clock(seq), consecutive_overruns_, link_.counters().consecutive_wrong, stop_since_ns_.has_value()};
+  }
+
+  std::int64_t wait_ns() const noexcept {
+    if (!is_real_time() || !loop_.started()) {
+      return kLongestWaitNs;
+    }
+    const std::int64_t until = silent_pacer_ ? silent_pacer_->tick_ns() : last_heard_ns_ + silence_ns_;
+    return std::clamp<std::int64_t>(until - monotonic_ns(), 0, kLongestWaitNs);
+  }
+
+  void answer_newest() noexcept {
+    measurement_v1 measurement;
+    if (!link_.take(measurement)) {
+      return;
+    }
+    last_heard_ns_ = now_ns_;
+    silent_pacer_.reset();
+    if (loop_.is_new(measurement.seq)) {
+      report_.arrival.add(now_ns_ - measurement.utime * kNanosecondsPerMicrosecond);
+      loop_.handle(measurement, conditions(measurement.seq));
+      send_command();
+      count_overrun();
+    } else if (!is_real_time() && measurement.seq == loop_.last_seq()) {
+      link_.send(loop_.command());
+      ++report_.commands;
+      ++report_.repeated;
+    }
+  }
+
+  // The path of the measurements may be broken while that of the commands is not: keep commanding the safe torque.
+  void answer_silence() noexcept {
+    if (!is_real_time() || !loop_.started() || now_ns_ - last_heard_ns_ < silence_ns_) {
+      return;
+    }
+    if (!silent_pacer_) {
+      silent_pacer_.emplace(now_ns_, period_ns_);
+    }
+    if (now_ns_ >= silent_pacer_->tick_ns()) {
+      loop_.handle_silence(conditions(loop_.last_seq() + 1));
+      send_command();
+      silent_pacer_->next(now_ns_);
+    }
+  }
+
+  void send_command() noexcept {
+    link_.send(loop_.command());
+    ++report_.commands;
+    if (ring_ != nullptr) {
+      loop_.telemetry().drops = ring_->drops();
+      ring_->push(loop_.telemetry());
+    }
+    if (loop_.state() == ControllerState::kFault && !fault_announced_) {
+      fault_announced_ = true;
+      link_.send(EventCode::kFault, loop_.last_seq(), static_cast<std::int64_t>(loop_.cause()));
+    }
+  }
+
+  void count_overrun() noexcept {
+    const std::int64_t response_ns = monotonic_ns() - now_ns_;
+    report_.response.add(response_ns);
+    if (is_real_time() && response_ns > period_ns_) {
+      ++report_.deadline_overruns;
+      ++consecutive_overruns_;
+    } else {
+      consecutive_overruns_ = 0;
+    }
+  }
+
+  std::optional<ControllerRunEnd> find_end() noexcept {
+    event_v1 event;
+    if (link_.take(event) && event.code == static_cast<std::int32_t>(EventCode::kEnded)) {
+      return ControllerRunEnd::kPlantEnded;
+    }
+    const bool safe = loop_.started() && loop_.is_safe(policy_clock(loop_.last_seq()));
+    if (stop_since_ns_ && (safe || !loop_.started() || now_ns_ - *stop_since_ns_ > kLongestStopNs)) {
+      return ControllerRunEnd::kStopped;
+    }
+    if (settings_.exit_on_fault && safe) {
+      return ControllerRunEnd::kFault;
+    }
+    if (now_ns_ - last_heard_ns_ > timeout_ns_) {
+      return loop_.started() ? ControllerRunEnd::kPlantSilent : ControllerRunEnd::kPlantNeverHeard;
+    }
+    return std::nullopt;
+  }
+
+  ControlLoop& loop_;
+  Link& link_;
+  TelemetryPublisher::Ring* ring_;
+  ControllerRunSettings settings_;
+  std::int64_t period_ns_;
+  std::int64_t silence_ns_;
+  std::int64_t timeout_ns_;
+  std::int64_t last_heard_ns_;
+  std::int64_t now_ns_ = 0;
+  std::int64_t consecutive_overruns_ = 0;
+  std::optional<std::int64_t> stop_since_ns_;
+  std::optional<Pacer> silent_pacer_;
+  bool fault_announced_ = false;
+  ControllerRunReport report_;
+};
+
+}  // namespace
+
+const char* to_string(ControllerRunEnd end) noexcept {
+  switch (end) {
+    case ControllerRunEnd::kPlantEnded:
+      return "plant ended";
+    case ControllerRunEnd::kStopped:
+      return "stopped";
+    case ControllerRunEnd::kFault:
+      return "fault";
+    case ControllerRunEnd::kPlantSilent:
+      return "plant silent";
+    case ControllerRunEnd::kPlantNeverHeard:
+      return "plant never heard";
+  }
+  return "unknown";
+}
+
+ControllerRunReport run_controller(ControlLoop& loop, Link& link, TelemetryPublisher::Ring* ring,
+                                   const ControllerRunSettings& settings, const std::atomic<bool>& stop) noexcept {
+  return ControllerRun(loop, link, ring, settings).run(stop);
+}
+
+}  // namespace quasilpv

@@ -1,0 +1,66 @@
+#include "quasilpv/run_report.hpp"
+
+#include <algorithm>
+#include <iomanip>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace quasilpv {
+namespace {
+
+using Rows = std::vector<std::pair<std::string, std::string>>;
+
+void flatten(const Json& value, const std::string& path, Rows& rows) {
+  if (!value.is_object()) {
+    rows.emplace_back(path, value.is_string() ? value.get<std::string>() : value.dump());
+    return;
+  }
+  for (const auto& [name, member] : value.items()) {
+    flatten(member, path.empty() ? name : path + "." + name, rows);
+  }
+}
+
+}  // namespace
+
+Json to_json(const LatencyHistogram& histogram) {
+  if (histogram.count() == 0) {
+    return nullptr;
+  }
+  return {{"count", histogram.count()},
+          {"p50", histogram.quantile_ns(0.5)},
+          {"p99", histogram.quantile_ns(0.99)},
+          {"p99_9", histogram.quantile_ns(0.999)},
+          {"max", histogram.max_ns()}};
+}
+
+Json to_json(const LinkCounters& counters) {
+  return {{"accepted", counters.accepted},
+          {"duplicates", counters.duplicates},
+          {"old", counters.old},
+          {"superseded", counters.superseded},
+          {"wrong_length", counters.wrong_length},
+          {"wrong_checksum", counters.wrong_checksum},
+          {"wrong_type", counters.wrong_type},
+          {"wrong_session", counters.wrong_session},
+          {"wrong_artifact", counters.wrong_artifact},
+          {"send_failures", counters.send_failures}};
+}
+
+void print_report(std::ostream& out, const Json& report, bool as_json) {
+  if (as_json) {
+    out << report.dump() << '\n';
+    return;
+  }
+  Rows rows;
+  flatten(report, "", rows);
+  std::size_t width = 0;
+  for (const auto& [path, value] : rows) {
+    width = std::max(width, path.size());
+  }
+  for (const auto& [path, value] : rows) {
+    out << std::left << std::setw(static_cast<int>(width) + 2) << path << value << '\n';
+  }
+}
+
+}  // namespace quasilpv

@@ -1,0 +1,94 @@
+#include "quasilpv/telemetry_publisher.hpp"
+
+#include <chrono>
+
+#include "quasilpv/realtime.hpp"
+
+namespace quasilpv {
+
+TelemetryPublisher::TelemetryPublisher(std::unique_ptr<Link> link, double sample_period_s, int joints,
+                                       const std::string& record_path)
+    : link_(std::move(link)),
+      sample_period_s_(sample_period_s),
+      joints_(joints),
+      record_(record_path.empty() ? nullptr : std::make_unique<CsvWriter>(record_path)),
+      ring_(std::make_unique<Ring>()) {
+  if (record_ != nullptr) {
+    write_header();
+  }
+  thread_ = std::thread([this] { run(); });
+}
+
+TelemetryPublisher::~TelemetryPublisher() { stop(); }
+
+TelemetryReport TelemetryPublisher::stop() {
+  if (thread_.joinable()) {
+    stopping_.store(true, std::memory_order_release);
+    thread_.join();
+    report_.drops = ring_->drops();
+    report_.send_failures = link_ != nullptr ? link_->counters().send_failures : 0;
+    if (record_ != nullptr && !record_->close() && report_.record_drops == 0) {
+      report_.record_drops = 1;  // the last rows were lost in the file's own buffer
+    }
+  }
+  return report_;
+}
+
+void TelemetryPublisher::run() {
+  // The ring holds seconds of samples at 1 kHz: polling it leaves the control thread without a system call per sample.
+  constexpr std::chrono::milliseconds kPollPeriod{1};
+  leave_realtime();
+  while (!stopping_.load(std::memory_order_acquire)) {
+    drain();
+    std::this_thread::sleep_for(kPollPeriod);
+  }
+  drain();
+}
+
+void TelemetryPublisher::drain() {
+  telemetry_v1 sample;
+  while (ring_->pop(sample)) {
+    if (link_ != nullptr) {
+      link_->send(sample);
+      ++report_.published;
+    }
+    if (record_ != nullptr) {
+      write_row(sample);
+    }
+  }
+}
+
+void TelemetryPublisher::write_header() {
+  record_->head("seq");
+  record_->head("time_s");
+  for (const char* name :
+       {"measured_angle_rad", "measured_speed_rad_s", "reference_angle_rad", "reference_speed_rad_s",
+        "reference_acceleration_rad_s2", "torque_commanded_nm", "torque_applied_nm", "estimated_angle_rad",
+        "estimated_speed_rad_s", "estimated_disturbance", "filtered_disturbance", "integral_error_rad_s"}) {
+    record_->head(name, joints_);
+  }
+  for (const char* name : {"flags", "state", "step_ns"}) {
+    record_->head(name);
+  }
+  record_->end_row();
+}
+
+void TelemetryPublisher::write_row(const telemetry_v1& sample) {
+  record_->add(sample.seq);
+  record_->add(static_cast<double>(sample.seq) * sample_period_s_);
+  for (const double* values :
+       {sample.measured_angle_rad, sample.measured_speed_rad_s, sample.reference_angle_rad,
+        sample.reference_speed_rad_s, sample.reference_acceleration_rad_s2, sample.commanded_torque_nm,
+        sample.applied_torque_nm, sample.estimated_angle_rad, sample.estimated_speed_rad_s,
+        sample.estimated_disturbance, sample.filtered_disturbance, sample.integral_error_rad_s}) {
+    record_->add(values, joints_);
+  }
+  record_->add(static_cast<std::int64_t>(sample.flags));
+  record_->add(static_cast<std::int64_t>(sample.state));
+  record_->add(sample.step_ns);
+  if (!record_->end_row()) {
+    ++report_.record_drops;
+  }
+}
+
+}  // namespace quasilpv

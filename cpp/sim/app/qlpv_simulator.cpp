@@ -1,0 +1,143 @@
+// qlpv-simulator: the plant of one scenario, one run over LCM. Contract: docs/reference/messages.md
+#include <fstream>
+#include <iostream>
+#include <string>
+
+#include "quasilpv/artifact.hpp"
+#include "quasilpv/command_line.hpp"
+#include "quasilpv/lcm_link.hpp"
+#include "quasilpv/plant_loop.hpp"
+#include "quasilpv/run_report.hpp"
+#include "quasilpv/scenario.hpp"
+
+namespace {
+
+using namespace quasilpv;  // NOLINT(google-build-using-namespace): this file is the program
+
+constexpr const char* kFooter =
+    "Example:\n"
+    "  qlpv-controller --artifact artifact.json --trajectory trajectory.json --session 7 --record controller.csv &\n"
+    "  qlpv-simulator --artifact artifact.json --scenario scenario.json --session 7 --record plant.csv\n\n"
+    "Exit codes: 0 done, 2 bad input, 3 fault stop, 4 no real-time privilege, 5 no transport, 6 plant failure.";
+
+struct Options {
+  CommonOptions common;
+  std::string scenario;
+  double brake_time_constant_s = 0.05;
+  PlantRunSettings run;
+};
+
+void declare_all(CLI::App& app, Options& options) {
+  app.footer(kFooter);
+  declare(app, options.common);
+  app.add_option("--scenario", options.scenario, "the experiment, true plant included")->required();
+  app.add_option("--hold-s", options.run.hold_s, "realtime: the watchdog brakes after so long without a command")
+      ->check(CLI::PositiveNumber.description(""))
+      ->capture_default_str();
+  app.add_option("--brake-time-constant-s", options.brake_time_constant_s, "realtime: of the watchdog's viscous brake")
+      ->check(CLI::PositiveNumber.description(""))
+      ->capture_default_str();
+}
+
+Json describe(const PlantRunReport& run, const LinkCounters& counters, bool realtime) {
+  return {{"end", to_string(run.end)},
+          {"controller_state", to_string(run.controller_state)},
+          {"samples", run.samples},
+          {"repeated_measurements", run.repeated},
+          {"missed_commands", run.missed_commands},
+          {"late_commands", run.late_commands},
+          {"watchdog_samples", run.watchdog_samples},
+          {"overruns", run.overruns},
+          {"skipped_ticks", run.skipped_ticks},
+          {"rt", realtime},
+          {"wakeup_ns", to_json(run.wakeup)},
+          {"round_trip_ns", to_json(run.round_trip)},
+          {"link", to_json(counters)}};
+}
+
+/// The record of a run, created before it starts so that a bad path costs nothing.
+class RecordFile {
+ public:
+  explicit RecordFile(const std::string& path) : path_(path) {
+    if (!path_.empty()) {
+      file_.open(path_, std::ios::binary | std::ios::trunc);
+      require_good("a file that can be created");
+    }
+  }
+
+  /// Where the run records, null without a path.
+  Record* record() { return path_.empty() ? nullptr : &record_; }
+
+  void write() {
+    if (!path_.empty()) {
+      record_.write_csv(file_);
+      file_.close();
+      require_good("room for the whole record");
+    }
+  }
+
+ private:
+  void require_good(const char* expected) const {
+    if (!file_) {
+      throw InputError(path_, "record", "a write error", expected);
+    }
+  }
+
+  std::string path_;
+  std::ofstream file_;
+  Record record_;
+};
+
+int exit_code(const PlantRunReport& run, const CommonOptions& options) {
+  switch (run.end) {
+    case PlantRunEnd::kControllerNeverHeard:
+      throw TransportError("no command of session " + std::to_string(options.session) + " on " + options.url +
+                           " within " + std::to_string(options.timeout_s) + " s: is qlpv-controller running?");
+    case PlantRunEnd::kControllerSilent:
+    case PlantRunEnd::kControllerEnded:
+      return kExitFaultStop;
+    case PlantRunEnd::kStopped:
+      return kExitDone;
+    case PlantRunEnd::kCompleted:
+      break;
+  }
+  return run.watchdog_at_end || run.controller_state == ControllerState::kFault ? kExitFaultStop : kExitDone;
+}
+
+int run(const CLI::App& app, Options& options) {
+  const CommonOptions& common = options.common;
+  const Artifact artifact = Artifact::load(common.artifact);
+  const Scenario scenario = Scenario::load(options.scenario);
+  if (scenario.joints() != artifact.joints()) {
+    throw InputError(options.scenario, "plant", std::to_string(scenario.joints()) + " joints",
+                     std::to_string(artifact.joints()) + " as in artifact '" + artifact.name() + "'");
+  }
+  PlantSession session(scenario, artifact.sample_period_s());
+  const bool realtime = apply_priority(app, common);
+  const WireIdentity identity{common.session, artifact.hash_prefix(), artifact.joints()};
+  LcmLink link(Side::kPlant, identity, common.url, common.allow_network);
+
+  options.run.pace = common.pace;
+  options.run.timeout_s = common.timeout_s;
+  options.run.brake_nm_s = viscous_brake(scenario, options.brake_time_constant_s);
+  RecordFile file(common.record);
+  PlantRunReport report;
+  try {
+    report = run_plant(session, link, options.run, file.record(), install_stop_signals());
+  } catch (const PlantError&) {
+    file.write();  // what led to the failure
+    throw;
+  }
+  print_report(std::cout, describe(report, link.counters(), realtime), common.json);
+  file.write();
+  return exit_code(report, common);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Runs the plant of a scenario against a controller over LCM.", "qlpv-simulator");
+  Options options;
+  declare_all(app, options);
+  return run_main(app, argc, argv, [&] { return run(app, options); });
+}

@@ -1,0 +1,75 @@
+// The plant's side of a run over a link.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "quasilpv/failsafe.hpp"
+#include "quasilpv/latency_histogram.hpp"
+#include "quasilpv/link.hpp"
+#include "quasilpv/pacer.hpp"
+#include "quasilpv/plant_session.hpp"
+#include "quasilpv/record.hpp"
+#include "quasilpv/scenario.hpp"
+
+namespace quasilpv {
+
+struct PlantRunSettings {
+  Pace pace = Pace::kLockStep;
+  double timeout_s = 10.0;  ///< without any command: end of the run
+  double hold_s = 0.02;     ///< real time: the last torque stays in force for at most this long
+  JointArray brake_nm_s{};  ///< watchdog's viscous brake per joint, N m s/rad; viscous_brake()
+};
+
+/// How a run ended.
+enum class PlantRunEnd {
+  kCompleted,
+  kStopped,              ///< SIGINT or SIGTERM
+  kControllerEnded,      ///< lock-step: the controller said it leaves
+  kControllerSilent,     ///< no command for `timeout_s`
+  kControllerNeverHeard  ///< no command at all
+};
+
+const char* to_string(PlantRunEnd end) noexcept;
+
+struct PlantRunReport {
+  PlantRunEnd end = PlantRunEnd::kCompleted;
+  std::int64_t samples = 0;           ///< integrated
+  std::int64_t repeated = 0;          ///< measurements sent again
+  std::int64_t missed_commands = 0;   ///< real time: samples that ended without their command
+  std::int64_t late_commands = 0;     ///< real time: commands that arrived in a later sample, and acted from there
+  std::int64_t watchdog_samples = 0;  ///< real time: samples under the watchdog's brake
+  bool watchdog_at_end = false;       ///< the last sample was one of them
+  std::int64_t overruns = 0;          ///< real time: samples this process did not finish in time
+  std::int64_t skipped_ticks = 0;     ///< grid points skipped for it: the plant's clock stood still
+  ControllerState controller_state = ControllerState::kInit;  ///< of the last command
+  LatencyHistogram wakeup;                                    ///< real time: grid point to wake-up
+  LatencyHistogram round_trip;                                ///< measurement sent to its command received
+};
+
+/// Viscous coefficient per joint that, alone, would stop the joint with the given time constant at the scenario's
+/// initial posture: b_j = 1 / (time_constant * d(acceleration_j)/d(torque_j)). INIT-ONLY. Throws PlantError like
+/// Plant::sample().
+JointArray viscous_brake(const Scenario& scenario, double time_constant_s);
+
+/// Runs the plant to the end of its scenario over a link (docs/reference/messages.md). Both modes begin in lock-step:
+/// measurement 0 is repeated every 50 ms until the controller answers.
+///
+/// Lock-step: sample k is integrated after command k arrived, with the scenario's delay: the same calls, in the same
+/// order, as run_closed_loop().
+///
+/// Real time: sample k begins at the first free point of the grid, command k acts from the moment it arrives (measured
+/// from the measurement's departure), a late one from its arrival in a later sample; of two that arrive in one sample
+/// the newer one acts. After `hold_s` of plant time without a command the watchdog applies -brake_nm_s * speed, taken
+/// per sample. Wall time that this process misses (its tick comes late) passes for the controller, not for the plant.
+///
+/// RT-UNSAFE. Throws PlantError like PlantSession::advance(); the controller is told that the run is over either way.
+///
+/// @param record  gets `seq`, `time_s`, the columns of PlantColumns, `torque_nm` (the command, or what stands in for
+/// it)
+///                and `command_delay_s` (-1: no command in this sample); may be null
+/// @param stop    set by a signal handler or another thread
+PlantRunReport run_plant(PlantSession& session, Link& link, const PlantRunSettings& settings, Record* record,
+                         const std::atomic<bool>& stop);
+
+}  // namespace quasilpv
