@@ -97,6 +97,9 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
   static_cast<void>(root["schema_version"].integer(1, 1));
   Scenario scenario;
   scenario.name = root["name"].text();
+  if (scenario.name.empty()) {
+    root["name"].fail("an empty name", "a name");
+  }
   scenario.duration_s = root["duration_s"].positive();
   scenario.plant = quasilpv::plant(root["plant"], source);
   const int n = scenario.joints();

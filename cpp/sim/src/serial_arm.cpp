@@ -101,7 +101,7 @@ void check_link(const SerialArmLink& link, const std::string& source, const std:
     }
   };
   require(std::isfinite(link.length_m) && link.length_m > 0.0, "length_m", link.length_m, "a number > 0");
-  require(std::isfinite(link.mass_kg) && link.mass_kg >= 0.0, "mass_kg", link.mass_kg, "a number >= 0");
+  require(std::isfinite(link.mass_kg) && link.mass_kg > 0.0, "mass_kg", link.mass_kg, "a number > 0");
   require(std::isfinite(link.com_m), "com_m", link.com_m, "a finite number");
   require(std::isfinite(link.friction_nm_s) && link.friction_nm_s >= 0.0, "friction_nm_s", link.friction_nm_s,
           "a number >= 0 (viscous friction dissipates)");

@@ -12,7 +12,7 @@ namespace quasilpv {
 /// One link of a planar arm.
 struct SerialArmLink {
   double length_m = 0.0;       ///< L, from its joint to the next one (or to the tool)
-  double mass_kg = 0.0;        ///< m >= 0
+  double mass_kg = 0.0;        ///< m > 0
   double com_m = 0.0;          ///< r, centre of mass from the joint, along the link
   double inertia_kg_m2 = 0.0;  ///< I > 0 about the *joint axis*, at least m r^2 (parallel axis theorem)
   double friction_nm_s = 0.0;  ///< f >= 0, viscous friction torque per joint speed
