@@ -2,6 +2,7 @@
 
 from itertools import product
 
+import cvxpy as cp
 import numpy as np
 import pytest
 from hypothesis import given
@@ -257,6 +258,33 @@ def test_moving_the_centre_is_a_slack_shift(case: tuple) -> None:
 def test_slack_pattern_is_membership_minus_the_mean() -> None:
     polytope = BlockPolytope.grouped([0, 0, 0], [1, 1, 1], [[0, 1], [2]])
     assert_allclose(polytope.slack_pattern, [[0.5, -0.5]] * 4 + [[-0.5, 0.5]] * 2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_slack_relaxation_is_the_matrix_cube_relaxation(seed: int) -> None:
+    """Equal largest t: all shifted vertices <= -t I; or X(zc) + sum S_p <= -t I with S_p >= +-radius_p X_p."""
+    rng = np.random.default_rng(seed)
+    r, size = 3, 3
+    half = rng.normal(size=(r + 1, size, size))
+    constant, *coefficients = half + half.transpose(0, 2, 1)
+    lower = rng.uniform(-1, 0, r)
+    upper = lower + rng.uniform(0.2, 2, r)
+    polytope = BlockPolytope.per_premise(lower, upper)
+    identity = np.eye(size)
+
+    t, T = cp.Variable(), [cp.Variable((size, size), symmetric=True) for _ in range(r)]
+    vertices = polytope.vertices(constant, np.array(coefficients))
+    shifts = [sum(z * slack for z, slack in zip(row, T, strict=True)) for row in polytope.slack_pattern]
+    shifted = [X + shift << -t * identity for X, shift in zip(vertices, shifts, strict=True)]
+    slack_margin = cp.Problem(cp.Maximize(t), shifted).solve(solver=cp.CLARABEL)
+
+    S = [cp.Variable((size, size), symmetric=True) for _ in range(r)]
+    radius, centre = (upper - lower) / 2, (upper + lower) / 2
+    cube = [constant + sum(c * X for c, X in zip(centre, coefficients, strict=True)) + sum(S) << -t * identity]
+    for p in range(r):
+        cube += [S[p] >> radius[p] * coefficients[p], S[p] >> -radius[p] * coefficients[p]]
+    cube_margin = cp.Problem(cp.Maximize(t), cube).solve(solver=cp.CLARABEL)
+    assert_allclose(slack_margin, cube_margin, atol=1e-6)
 
 
 # ---- collapse --------------------------------------------------------------------------------------------------------
