@@ -342,6 +342,19 @@ def test_arm3_inertia_vertices_are_definite_for_two_centred_premises_only() -> N
     assert inertia_vertex_eigenvalues([1, 2], centre=0.0).min() < 0.0  # Dehak 2022, IV.5.1 claims otherwise
 
 
+def test_grouping_makes_all_arm3_inertia_vertices_definite_at_no_cost_in_vertices() -> None:
+    """Three measured premises: six vertices either way, indefinite one by one, definite with z_2 and z_3 together."""
+    arm3 = robot("arm3")
+    affine = arm3.model.inertia_affine()
+    bounds = np.array([premise.bounds for premise in arm3.model.inertia_premises(arm3.domain)])
+    smallest = {}
+    for name, partition in {"alone": [[0], [1], [2]], "together": [[1, 2], [0]]}.items():
+        polytope = BlockPolytope.grouped(*bounds.T, partition)
+        assert polytope.vertex_count == 6
+        smallest[name] = np.linalg.eigvalsh(polytope.vertices(affine.constant, affine.coefficients))[:, 0].min()
+    assert smallest["alone"] < 0.0 < smallest["together"]
+
+
 def test_arm3_inertia_vertices_printed_for_the_generic_box_have_the_published_eigenvalues() -> None:
     """(II.10) with z_2, z_3 in [-1, 1] and z_1 = 0: -.873, -.160, .223, .233."""
     affine = robot("arm3").model.inertia_affine()
