@@ -1,0 +1,163 @@
+// No allocation after initialisation: malloc and its family, and with them operator new, are replaced by counting ones.
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+
+#include "artifact_fixture.hpp"
+#include "quasilpv/controller.hpp"
+#include "quasilpv/trajectory.hpp"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define QUASILPV_COUNTS_ALLOCATIONS 0  // sanitizers bring their own malloc
+#else
+#define QUASILPV_COUNTS_ALLOCATIONS 1
+#endif
+
+namespace {
+
+thread_local bool counting = false;
+thread_local int allocations = 0;
+
+[[maybe_unused]] void count() noexcept { allocations += counting ? 1 : 0; }
+
+}  // namespace
+
+#if QUASILPV_COUNTS_ALLOCATIONS
+// NOLINTBEGIN(bugprone-reserved-identifier): glibc's own entry points, so that the replacements need no dlsym.
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* block, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+void* malloc(std::size_t size) noexcept {
+  count();
+  return __libc_malloc(size);
+}
+
+void* calloc(std::size_t number, std::size_t size) noexcept {
+  count();
+  return __libc_calloc(number, size);
+}
+
+void* realloc(void* block, std::size_t size) noexcept {
+  count();
+  return __libc_realloc(block, size);
+}
+
+void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
+  count();
+  return __libc_memalign(alignment, size);
+}
+
+int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
+  count();
+  *block = __libc_memalign(alignment, size);
+  return *block == nullptr ? 12 : 0;  // ENOMEM
+}
+}
+// NOLINTEND(bugprone-reserved-identifier)
+#endif
+
+namespace quasilpv {
+namespace {
+
+using ::quasilpv::testing::artifact_table;
+using ::quasilpv::testing::json_twin;
+
+// Allocations made by `action`.
+template <class Action>
+int allocations_of(Action action) {
+  allocations = 0;
+  counting = true;
+  action();
+  counting = false;
+  return allocations;
+}
+
+class Allocation : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (QUASILPV_COUNTS_ALLOCATIONS == 0) {
+      GTEST_SKIP() << "the sanitizer replaces malloc itself";
+    }
+  }
+};
+
+struct alignas(64) Overaligned {
+  double values[8];
+};
+
+TEST_F(Allocation, is_counted_for_new_for_aligned_new_and_for_dynamic_eigen) {
+  std::unique_ptr<int> plain;
+  EXPECT_EQ(allocations_of([&] { plain = std::make_unique<int>(1); }), 1);
+  std::unique_ptr<Overaligned> aligned;
+  EXPECT_EQ(allocations_of([&] { aligned = std::make_unique<Overaligned>(); }), 1);
+  Eigen::VectorXd dynamic;
+  EXPECT_GE(allocations_of([&] { dynamic.setZero(5); }), 1);
+}
+
+TEST_F(Allocation, does_not_happen_in_10000_steps_of_any_law_whatever_the_input) {
+  for (const char* kind : {"dob-acceleration", "pid", "ctc", "ctc-dob"}) {
+    for (const int joints : {1, 3, 7}) {
+      Controller controller(Artifact::parse(json_twin(artifact_table(kind, joints)), "test"));
+      std::uint32_t flags = 0;
+      const int count = allocations_of([&] {
+        for (int k = 0; k < 10000; ++k) {
+          StepInput input;
+          input.seq = k;
+          input.valid = k % 13 != 0;
+          input.angle.fill(k % 17 == 0 ? std::numeric_limits<double>::quiet_NaN() : 3e-4 * k);
+          input.speed.fill(0.1);
+          input.reference.angle.fill(k % 19 == 0 ? std::numeric_limits<double>::infinity() : 3e-4 * k + 0.01);
+          flags |= controller.step(input).flags;
+          if (k == 5000) {
+            controller.reset();
+          }
+        }
+      });
+      EXPECT_EQ(count, 0) << kind << ", " << joints << " joints";
+      EXPECT_EQ(flags & (kMeasurementInvalid | kReferenceInvalid | kPremiseOutsideBox),
+                kMeasurementInvalid | kReferenceInvalid | kPremiseOutsideBox);
+    }
+  }
+}
+
+TEST_F(Allocation, does_not_happen_when_blocks_of_several_premises_keep_the_vertex_sum) {
+  Json table = artifact_table("dob-acceleration", 2);
+  Json& inertia = table["law"]["inertia"];
+  const Json& vertex = inertia["blocks"][0]["vertices"][0];
+  inertia["blocks"] = {{{"kind", "box"}, {"premises", {0, 1}}, {"vertices", {vertex, vertex, vertex, vertex}}}};
+  Controller controller(Artifact::parse(json_twin(table), "test"));
+  EXPECT_EQ(allocations_of([&] {
+              for (int k = 0; k < 10000; ++k) {
+                controller.step({});
+              }
+            }),
+            0);
+}
+
+TEST_F(Allocation, does_not_happen_when_a_trajectory_is_evaluated) {
+  const Json table = {{"schema", "quasilpv.trajectory"},
+                      {"schema_version", 1},
+                      {"name", "line"},
+                      {"joints", 1},
+                      {"task", nullptr},
+                      {"knots_s", {0.0, 1.0, 2.0}},
+                      {"coefficients", Json::parse("[[[0,1,0,0,0,0]],[[1,1,0,0,0,0]]]")}};
+  const Trajectory trajectory = Trajectory::parse(json_twin(table), "test");
+  double sum = 0.0;
+  EXPECT_EQ(allocations_of([&] {
+              for (int k = 0; k < 10000; ++k) {
+                sum += trajectory.evaluate(3e-4 * k).angle[0];
+              }
+            }),
+            0);
+  EXPECT_GT(sum, 0.0);
+}
+
+}  // namespace
+}  // namespace quasilpv

@@ -1,0 +1,158 @@
+// One sample of each law, written out from the formulas with dynamic matrices and explicit inverses: the independent
+// implementation that tests compare the library with.
+#pragma once
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "artifact_fixture.hpp"
+#include "quasilpv/step.hpp"
+
+namespace quasilpv::testing {
+
+/// Measurement and reference of one sample.
+struct Sample {
+  Eigen::VectorXd angle, speed, reference, reference_speed, reference_acceleration;
+
+  StepInput input(std::int64_t seq) const {
+    StepInput input;
+    input.seq = seq;
+    input.angle = to_joint_array(angle);
+    input.speed = to_joint_array(speed);
+    input.reference = {to_joint_array(reference), to_joint_array(reference_speed),
+                       to_joint_array(reference_acceleration)};
+    return input;
+  }
+
+  static Sample at_rest(const Eigen::VectorXd& angle) {
+    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(angle.size());
+    return {angle, zero, angle, zero, zero};
+  }
+};
+
+/// Saturation, then slew, as the formulas have it; the first torque has no predecessor.
+struct OutputStage {
+  double torque_limit;
+  double max_change;
+  Eigen::VectorXd last = {};
+
+  Eigen::VectorXd apply(const Eigen::VectorXd& torque) {
+    Eigen::VectorXd limited = torque.cwiseMax(-torque_limit).cwiseMin(torque_limit);
+    if (last.size() > 0) {
+      limited = limited.cwiseMax((last.array() - max_change).matrix()).cwiseMin((last.array() + max_change).matrix());
+    }
+    last = limited;
+    return limited;
+  }
+};
+
+inline void integrate(const Eigen::VectorXd& error, double gain, const Eigen::VectorXd& commanded,
+                      const Eigen::VectorXd& applied, Eigen::VectorXd& integral) {
+  for (Eigen::Index j = 0; j < error.size(); ++j) {
+    if ((commanded(j) - applied(j)) * gain * error(j) <= 0.0) {
+      integral(j) += kSamplePeriod * error(j);
+    }
+  }
+}
+
+struct WrittenOutLaw {
+  virtual ~WrittenOutLaw() = default;
+  /// Returns the commanded torque; the applied one is output.last.
+  virtual Eigen::VectorXd step(const Sample& s) = 0;
+
+  TestArm arm;
+  OutputStage output;
+  Eigen::VectorXd integral, disturbance;
+  bool started = false;
+
+  WrittenOutLaw(TestArm test_arm, OutputStage stage) : arm(test_arm), output(std::move(stage)) {
+    integral = disturbance = Eigen::VectorXd::Zero(arm.joints);
+  }
+};
+
+struct WrittenOutDobAcceleration : WrittenOutLaw {
+  using WrittenOutLaw::WrittenOutLaw;
+  Eigen::VectorXd th, w, a_d, j_d, d_f;
+  double compensation = 1.0;
+
+  Eigen::VectorXd step(const Sample& s) override {
+    const double T = kSamplePeriod;
+    const double q = std::exp(-T / 1e-3);
+    if (!started) {
+      th = s.angle;
+      w = a_d = j_d = d_f = Eigen::VectorXd::Zero(arm.joints);
+      started = true;
+    }
+    const Eigen::VectorXd innovation = s.angle - th;
+    th += 0.9 * innovation;
+    w += 550.0 * innovation;
+    a_d += 150000.0 * innovation;
+    j_d += 1.6e7 * innovation;
+    d_f = q * d_f + (1.0 - q) * a_d;
+    disturbance = a_d;
+    const Eigen::MatrixXd M = arm.inertia(s.angle);
+    const Eigen::VectorXd G = arm.gravity(s.angle);
+    const Eigen::VectorXd a_cmd = s.reference_acceleration - compensation * d_f - 4800.0 * (th - s.reference) -
+                                  120.0 * (w - s.reference_speed) - 64000.0 * integral;
+    const Eigen::VectorXd commanded = M * a_cmd + G;
+    const Eigen::VectorXd applied = output.apply(commanded);
+    integrate(s.angle - s.reference, -64000.0, commanded, applied, integral);
+    const Eigen::VectorXd a_app = M.inverse() * (applied - G) + a_d;
+    th += T * w + T * T / 2.0 * a_app + T * T * T / 6.0 * j_d;
+    w += T * a_app + T * T / 2.0 * j_d;
+    a_d += T * j_d;
+    return commanded;
+  }
+};
+
+struct WrittenOutPid : WrittenOutLaw {
+  using WrittenOutLaw::WrittenOutLaw;
+  Eigen::VectorXd w;
+
+  Eigen::VectorXd step(const Sample& s) override {
+    const double a = std::exp(-kSamplePeriod / 2e-3);
+    w = started ? Eigen::VectorXd(a * w + (1.0 - a) * s.speed) : s.speed;
+    started = true;
+    const Eigen::VectorXd e = s.reference - s.angle;
+    const Eigen::VectorXd commanded = 4000.0 * e + 300.0 * (s.reference_speed - w) + 9000.0 * integral +
+                                      arm.inertia(s.angle) * s.reference_acceleration +
+                                      arm.coriolis(s.angle, w, s.reference_speed) + arm.gravity(s.angle);
+    integrate(e, 9000.0, commanded, output.apply(commanded), integral);
+    return commanded;
+  }
+};
+
+struct WrittenOutComputedTorque : WrittenOutLaw {
+  double bandwidth;
+  Eigen::VectorXd w, previous_w, previous_known, a_hat;
+
+  WrittenOutComputedTorque(TestArm test_arm, OutputStage stage, double c)
+      : WrittenOutLaw(test_arm, std::move(stage)), bandwidth(c), a_hat(Eigen::VectorXd::Zero(test_arm.joints)) {}
+
+  // The observer in its other form: over a period, a = (w+ - w)/T - f is what the model does not explain, and the
+  // estimate follows it with the pole q.
+  Eigen::VectorXd step(const Sample& s) override {
+    const double T = kSamplePeriod;
+    const double q = std::exp(-bandwidth * T);
+    const double a = std::exp(-T / 2e-3);
+    w = started ? Eigen::VectorXd(a * w + (1.0 - a) * s.speed) : s.speed;
+    if (started) {
+      a_hat = q * a_hat + (1.0 - q) * ((w - previous_w) / T - previous_known);
+    }
+    started = true;
+    const Eigen::MatrixXd M = arm.inertia(s.angle);
+    const Eigen::VectorXd bias = arm.coriolis(s.angle, w, w) + arm.gravity(s.angle);
+    const Eigen::VectorXd e = s.reference - s.angle;
+    const Eigen::VectorXd commanded =
+        M * (s.reference_acceleration + 1200.0 * e + 60.0 * (s.reference_speed - w) + 8000.0 * integral - a_hat) + bias;
+    disturbance = M * a_hat;
+    const Eigen::VectorXd applied = output.apply(commanded);
+    integrate(e, 8000.0, commanded, applied, integral);
+    previous_w = w;
+    previous_known = M.inverse() * (applied - bias);
+    return commanded;
+  }
+};
+
+}  // namespace quasilpv::testing
