@@ -48,3 +48,7 @@ class FaultStop(QuasilpvError):  # noqa: N818 -- the machine's word: a stop, not
 
 class InfeasibleError(QuasilpvError):
     """A specification cannot be met: no design exists in the family that was searched (exit code 1)."""
+
+
+class ClaimError(QuasilpvError):
+    """A run did not show what it was to show, e.g. two runs that must be identical differ (exit code 1)."""
