@@ -20,7 +20,9 @@ namespace {
 // First step after a restart, s: the order starts at 1, so the first steps must be short (IDA's own guess is longer and
 // is then rejected).
 constexpr double kInitialStep = 1e-6;
-// Per interval. A 1 ms sample of a three-link arm takes about 40.
+// A step that must become shorter than this, s, has met a point where the plant is not defined.
+constexpr double kShortestStep = 1e-12;
+// Per interval. A 1 ms sample of a three-link arm takes about 30.
 constexpr long kMaxSteps = 100000;
 
 using VectorView = Eigen::Map<Eigen::VectorXd>;
@@ -132,6 +134,7 @@ IdaIntegrator::Solver::Solver(const Plant& the_plant, const IdaOptions& options)
   check(IDASetSuppressAlg(ida.get(), SUNTRUE), "IDASetSuppressAlg");
   check(IDASetLinearSolver(ida.get(), linear_solver.get(), matrix.get()), "IDASetLinearSolver");
   check(IDASetJacFn(ida.get(), jacobian), "IDASetJacFn");
+  check(IDASetMinStep(ida.get(), kShortestStep), "IDASetMinStep");
   check(IDASetMaxNumSteps(ida.get(), kMaxSteps), "IDASetMaxNumSteps");
 }
 

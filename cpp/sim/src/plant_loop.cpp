@@ -142,7 +142,9 @@ class PlantRun {
         ++report_.repeated;
       }
     }
-    report_.round_trip.add(monotonic_ns() - first_sent_ns);
+    if (session_.seq() > 0) {  // the first answer waits for the controller to start
+      report_.round_trip.add(monotonic_ns() - first_sent_ns);
+    }
     finish_sample(SampleTorque{to_array(command.torque_nm), 0.0}, /*scenario_delay=*/true);
     return true;
   }
@@ -154,7 +156,7 @@ class PlantRun {
       sleep_until(tick_ns);
       report_.wakeup.add(monotonic_ns() - tick_ns);
       send_measurement();
-      const SampleTorque sample = wait_for_command(tick_ns + period_ns_);
+      const SampleTorque sample = wait_for_command();
       if (!must_end()) {
         finish_sample(guard(sample), /*scenario_delay=*/false);
       }
@@ -163,8 +165,11 @@ class PlantRun {
     report_.skipped_ticks = pacer.skipped_ticks();
   }
 
-  SampleTorque wait_for_command(std::int64_t deadline_ns) {
+  /// The sample begins when its measurement leaves, not at the grid point: a late wake-up must not cost the controller
+  /// time.
+  SampleTorque wait_for_command() {
     const std::int64_t seq = session_.seq();
+    const std::int64_t deadline_ns = sent_ns_ + period_ns_;
     SampleTorque sample{session_.torque(), kNoCommand};
     command_v1 command;
     for (std::int64_t now_ns = monotonic_ns(); now_ns < deadline_ns; now_ns = monotonic_ns()) {

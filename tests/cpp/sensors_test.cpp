@@ -1,0 +1,113 @@
+// Encoder and speed noise.
+#include "quasilpv/sensors.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "arm_fixtures.hpp"
+
+namespace quasilpv {
+namespace {
+
+using testing::Uniform;
+
+constexpr double kTwoPi = 6.283185307179586;
+
+class EncoderOfBits : public ::testing::TestWithParam<int> {};
+
+TEST_P(EncoderOfBits, reads_the_nearest_multiple_of_its_quantum) {
+  Sensors sensors({GetParam(), 0.0, 0}, 1);
+  const double quantum = kTwoPi / std::pow(2.0, GetParam());
+  EXPECT_DOUBLE_EQ(sensors.angle_quantum_rad(), quantum);
+  Uniform uniform(11);
+  double largest_error = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    const double angle = uniform(-7.0, 7.0);
+    const double read = sensors.measure(i, {angle}, {}).angle[0];
+    const double counts = read / quantum;
+    EXPECT_NEAR(counts, std::round(counts), 1e-9 * std::max(1.0, std::abs(counts)));
+    EXPECT_LE(std::abs(read - angle), 0.5 * quantum * (1.0 + 1e-9));
+    largest_error = std::max(largest_error, std::abs(read - angle));
+  }
+  EXPECT_GT(largest_error, 0.49 * quantum);  // rounds to the nearest, so the bound is used up
+}
+
+INSTANTIATE_TEST_SUITE_P(CommonResolutions, EncoderOfBits, ::testing::Values(1, 8, 12, 17, 20));
+
+TEST(Sensors, when_bits_and_noise_are_zero_expect_the_truth_to_the_bit) {
+  Sensors sensors({0, 0.0, 5}, 3);
+  const JointArray angle{0.1, -1.0 / 3.0, 1e-9};
+  const JointArray speed{-0.2, 2.0 / 3.0, 1e9};
+  const Measurement measurement = sensors.measure(42, angle, speed);
+  EXPECT_EQ(measurement.seq, 42);
+  EXPECT_EQ(measurement.angle, angle);
+  EXPECT_EQ(measurement.speed, speed);
+}
+
+TEST(Sensors, quantisation_is_odd_and_rounds_ties_away_from_zero) {
+  EXPECT_EQ(quantise(0.75, 0.5), 1.0);
+  EXPECT_EQ(quantise(-0.75, 0.5), -1.0);
+  EXPECT_EQ(quantise(0.2, 0.5), 0.0);
+  EXPECT_EQ(quantise(0.2, 0.0), 0.2);
+}
+
+TEST(Sensors, entries_past_the_joints_stay_zero) {
+  Sensors sensors({0, 1.0, 5}, 2);
+  const Measurement measurement = sensors.measure(0, {1.0, 1.0, 1.0}, {1.0, 1.0, 1.0});
+  EXPECT_EQ(measurement.angle[2], 0.0);
+  EXPECT_EQ(measurement.speed[2], 0.0);
+}
+
+TEST(Sensors, noise_is_on_the_speed_only_and_the_same_for_the_same_seed) {
+  Sensors first({0, 0.05, 7}, 3), second({0, 0.05, 7}, 3), other({0, 0.05, 8}, 3);
+  for (int k = 0; k < 100; ++k) {
+    const JointArray angle{0.1, 0.2, 0.3};
+    const Measurement measurement = first.measure(k, angle, {});
+    EXPECT_EQ(measurement.angle, angle);
+    EXPECT_EQ(measurement.speed, second.measure(k, angle, {}).speed);
+    EXPECT_NE(measurement.speed, other.measure(k, angle, {}).speed);
+  }
+}
+
+TEST(GaussianNoise, is_the_box_muller_transform_of_the_standard_generator) {
+  // The C++ standard fixes every output of std::mt19937_64, so this is the definition written out.
+  std::mt19937_64 generator(20);
+  GaussianNoise noise(20);
+  for (int i = 0; i < 100; ++i) {
+    const double u = std::ldexp(static_cast<double>(generator() >> 11), -53);
+    const double v = std::ldexp(static_cast<double>(generator() >> 11), -53);
+    const double radius = std::sqrt(-2.0 * std::log(1.0 - u));
+    EXPECT_DOUBLE_EQ(noise(), radius * std::cos(kTwoPi * v));
+    EXPECT_DOUBLE_EQ(noise(), radius * std::sin(kTwoPi * v));
+  }
+}
+
+TEST(GaussianNoise, has_the_moments_of_white_standard_normal_noise) {
+  constexpr int kCount = 200000;
+  GaussianNoise noise(3);
+  std::vector<double> x(kCount);
+  for (double& value : x) {
+    value = noise();
+  }
+  double mean = 0.0, variance = 0.0, fourth = 0.0, correlation = 0.0;
+  int within_one_sigma = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    mean += x[i] / kCount;
+    variance += x[i] * x[i] / kCount;
+    fourth += std::pow(x[i], 4) / kCount;
+    correlation += i > 0 ? x[i] * x[i - 1] / kCount : 0.0;
+    within_one_sigma += std::abs(x[i]) < 1.0 ? 1 : 0;
+  }
+  // Five standard deviations of each estimate.
+  const double deviation = 5.0 / std::sqrt(kCount);
+  EXPECT_NEAR(mean, 0.0, deviation);
+  EXPECT_NEAR(correlation, 0.0, deviation);
+  EXPECT_NEAR(variance, 1.0, deviation * std::sqrt(2.0));
+  EXPECT_NEAR(fourth, 3.0, deviation * std::sqrt(96.0));
+  EXPECT_NEAR(within_one_sigma / double{kCount}, std::erf(std::sqrt(0.5)), deviation * 0.5);
+}
+
+}  // namespace
+}  // namespace quasilpv
