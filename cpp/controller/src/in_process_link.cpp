@@ -34,7 +34,10 @@ class InProcessLink::Queue {
 
   bool pop(Entry& entry, std::int64_t timeout_ns) {
     std::unique_lock<std::mutex> lock(mutex_);
-    if (!arrived_.wait_for(lock, std::chrono::nanoseconds(timeout_ns), [this] { return count_ > 0; })) {
+    // A poll must not enter the timed wait: that costs a trip through the scheduler.
+    const auto has_packet = [this] { return count_ > 0; };
+    if (!has_packet() &&
+        (timeout_ns <= 0 || !arrived_.wait_for(lock, std::chrono::nanoseconds(timeout_ns), has_packet))) {
       return false;
     }
     entry = entries_[first_];

@@ -44,7 +44,7 @@ struct PlantRunReport {
   std::int64_t skipped_ticks = 0;     ///< grid points skipped for it: the plant's clock stood still
   ControllerState controller_state = ControllerState::kInit;  ///< of the last command
   LatencyHistogram wakeup;                                    ///< real time: grid point to wake-up
-  LatencyHistogram round_trip;                                ///< measurement sent to its command received
+  LatencyHistogram round_trip;  ///< measurement sent to its command received; from sample 1 on
 };
 
 /// Viscous coefficient per joint that, alone, would stop the joint with the given time constant at the scenario's

@@ -1,0 +1,488 @@
+// Controller and plant around a link: the two-process run must be the in-process run, and losses must end safely.
+#include "quasilpv/loop.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <thread>
+
+#include "arm_fixtures.hpp"
+#include "artifact_fixture.hpp"
+#include "quasilpv/errors.hpp"
+#include "quasilpv/in_process_link.hpp"
+#include "quasilpv/plant_loop.hpp"
+#include "quasilpv/realtime.hpp"
+#include "quasilpv/run_controller.hpp"
+#include "quasilpv/simulation.hpp"
+
+namespace quasilpv {
+namespace {
+
+using ::quasilpv::testing::artifact_table;
+using ::quasilpv::testing::json_twin;
+using ::quasilpv::testing::kSamplePeriod;
+using ::quasilpv::testing::three_link_arm;
+
+constexpr int kJoints = 3;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr std::int64_t kMillisecond = kNanosecondsPerMillisecond;
+constexpr std::int64_t kPatience = 5 * kNanosecondsPerSecond;
+const JointArray kStart{0.3, -0.2, 0.4};
+
+/// Minimum-jerk motion of all joints by 0.2 rad in 1 s, from kStart.
+Trajectory trajectory() {
+  Json segment = Json::array();
+  for (int j = 0; j < kJoints; ++j) {
+    segment.push_back({kStart[static_cast<std::size_t>(j)], 0.0, 0.0, 2.0, -3.0, 1.2});
+  }
+  const Json table = {{"schema", "quasilpv.trajectory"},
+                      {"schema_version", 1},
+                      {"name", "minimum-jerk"},
+                      {"joints", kJoints},
+                      {"task", nullptr},
+                      {"knots_s", {0.0, 1.0}},
+                      {"coefficients", Json::array({segment})}};
+  return Trajectory::parse(json_twin(table), "test");
+}
+
+Artifact artifact(const std::string& kind = "dob-acceleration") {
+  return Artifact::parse(json_twin(artifact_table(kind, kJoints)), "test");
+}
+
+/// Every imperfection on: a difference in the order of calls or in the number of noise samples shows.
+Scenario scenario(std::int64_t samples) {
+  Scenario scenario;
+  scenario.name = "test";
+  scenario.duration_s = static_cast<double>(samples) * kSamplePeriod;
+  scenario.plant = three_link_arm(0.5);
+  scenario.external_torque = {{1, 20.0, 15.0, 0.3}};
+  scenario.sensors = {20, 0.05, 7};
+  scenario.transport_delay_s = 0.3 * kSamplePeriod;
+  scenario.initial_angle = kStart;
+  return scenario;
+}
+
+WireIdentity identity_of(const Artifact& artifact) { return {11, artifact.hash_prefix(), artifact.joints()}; }
+
+measurement_v1 measurement(std::int64_t seq, const JointArray& angle = kStart) {
+  measurement_v1 message{};
+  message.seq = seq;
+  std::copy(angle.begin(), angle.end(), message.angle_rad);
+  return message;
+}
+
+SampleConditions at(std::int64_t seq) {
+  SampleConditions conditions;
+  conditions.now_ns = seq * kMillisecond;
+  return conditions;
+}
+
+JointArray torque_of(const ControlLoop& loop) {
+  JointArray torque;
+  std::copy(std::begin(loop.command().torque_nm), std::end(loop.command().torque_nm), torque.begin());
+  return torque;
+}
+
+void expect_equal_columns(const Record& record, const Record& expected, const std::string& name,
+                          const std::string& expected_name) {
+  const std::vector<double>& values = record[name].values;
+  const std::vector<double>& others = expected[expected_name].values;
+  ASSERT_EQ(values.size(), others.size()) << name;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    ASSERT_EQ(values[i], others[i]) << name << " value " << i;
+  }
+}
+
+void expect_plant_record(const Record& record, const Record& in_process) {
+  for (const char* name : {"time_s", "angle_rad", "speed_rad_s", "acceleration_rad_s2", "external_torque_nm"}) {
+    expect_equal_columns(record, in_process, name, name);
+  }
+  expect_equal_columns(record, in_process, "torque_nm", "torque_applied_nm");
+}
+
+class EveryLaw : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(EveryLaw, gives_over_a_link_in_lock_step_the_samples_of_the_in_process_run_bit_for_bit) {
+  constexpr std::int64_t kSamples = 400;
+  const Artifact law = artifact(GetParam());
+  const Scenario experiment = scenario(kSamples);
+  Controller controller(law);
+  const RunRecord in_process = run_closed_loop(experiment, controller, trajectory());
+
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
+  ControlLoop loop(law, trajectory(), {});
+  auto ring = std::make_unique<TelemetryPublisher::Ring>();
+  const std::atomic<bool> stop{false};
+  ControllerRunReport controller_report;
+  std::thread thread(
+      [&, link = controller_end.get()] { controller_report = run_controller(loop, *link, ring.get(), {}, stop); });
+  PlantSession session(experiment, kSamplePeriod);
+  Record record;
+  const PlantRunReport plant_report = run_plant(session, *plant_end, {}, &record, stop);
+  thread.join();
+
+  EXPECT_EQ(plant_report.end, PlantRunEnd::kCompleted);
+  EXPECT_EQ(plant_report.samples, kSamples);
+  EXPECT_EQ(controller_report.end, ControllerRunEnd::kPlantEnded);
+  EXPECT_EQ(loop.steps(), kSamples);
+  expect_plant_record(record, in_process.samples);
+
+  telemetry_v1 sample;
+  std::size_t k = 0;
+  for (; ring->pop(sample); ++k) {
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      ASSERT_EQ(sample.seq, static_cast<std::int64_t>(k));
+      ASSERT_EQ(sample.estimated_speed_rad_s[j], in_process.samples["estimated_speed_rad_s"].values[k * kJoints + j]);
+      ASSERT_EQ(sample.measured_speed_rad_s[j], in_process.samples["measured_speed_rad_s"].values[k * kJoints + j]);
+      ASSERT_EQ(sample.applied_torque_nm[j], in_process.samples["torque_applied_nm"].values[k * kJoints + j]);
+    }
+  }
+  EXPECT_EQ(k, static_cast<std::size_t>(kSamples));
+}
+
+INSTANTIATE_TEST_SUITE_P(Loop, EveryLaw, ::testing::Values("dob-acceleration", "pid", "ctc", "ctc-dob"),
+                         [](const auto& kind) {
+                           std::string name = kind.param;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
+
+TEST(PlantLoop, when_the_first_copy_of_every_measurement_is_lost_expect_the_same_samples) {
+  constexpr std::int64_t kSamples = 5;
+  const Artifact law = artifact();
+  const Scenario experiment = scenario(kSamples);
+  Controller controller(law);
+  const RunRecord in_process = run_closed_loop(experiment, controller, trajectory());
+
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
+  std::thread thread([&, link = controller_end.get()] {
+    ControlLoop loop(law, trajectory(), {});
+    measurement_v1 received{};
+    std::int64_t lost = -1;
+    for (std::int64_t answered = 0; answered < kSamples && link->receive(kPatience);) {
+      if (!link->take(received)) {
+        continue;
+      }
+      if (received.seq > lost) {
+        lost = received.seq;
+        continue;
+      }
+      loop.handle(received, at(received.seq));
+      link->send(loop.command());
+      ++answered;
+    }
+  });
+  PlantSession session(experiment, kSamplePeriod);
+  Record record;
+  const std::atomic<bool> stop{false};
+  const PlantRunReport report = run_plant(session, *plant_end, {}, &record, stop);
+  thread.join();
+  EXPECT_EQ(report.end, PlantRunEnd::kCompleted);
+  EXPECT_EQ(report.repeated, kSamples);
+  expect_plant_record(record, in_process.samples);
+}
+
+TEST(PlantLoop, when_no_controller_answers_expect_an_end_after_the_timeout) {
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
+  PlantSession session(scenario(10), kSamplePeriod);
+  PlantRunSettings settings;
+  settings.timeout_s = 0.1;
+  const std::atomic<bool> stop{false};
+  EXPECT_EQ(run_plant(session, *plant_end, settings, nullptr, stop).end, PlantRunEnd::kControllerNeverHeard);
+  EXPECT_EQ(session.seq(), 0);
+}
+
+TEST(PlantLoop, when_commands_stop_in_real_time_expect_the_torque_held_for_20_ms_and_then_the_brake) {
+  constexpr std::int64_t kAnswered = 10;
+  constexpr std::int64_t kSamples = 60;
+  const Scenario experiment = scenario(kSamples);
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
+  std::thread thread([link = controller_end.get()] {
+    measurement_v1 received{};
+    for (std::int64_t newest = 0; newest < kAnswered && link->receive(kPatience);) {
+      if (link->take(received)) {
+        newest = received.seq;
+        command_v1 command{};
+        command.seq = received.seq;
+        command.torque_nm[0] = 5.0;
+        link->send(command);
+      }
+    }
+  });
+  PlantSession session(experiment, kSamplePeriod);
+  PlantRunSettings settings;
+  settings.pace = Pace::kRealTime;
+  settings.brake_nm_s = viscous_brake(experiment, 0.05);
+  Record record;
+  const std::atomic<bool> stop{false};
+  const PlantRunReport report = run_plant(session, *plant_end, settings, &record, stop);
+  thread.join();
+
+  ASSERT_EQ(report.samples, kSamples);
+  EXPECT_TRUE(report.watchdog_at_end);
+  const std::vector<double>& delay = record["command_delay_s"].values;
+  std::size_t last = kSamples - 1;
+  while (delay[last] < 0.0) {
+    --last;
+  }
+  const auto torque = [&record](std::size_t k, std::size_t j) { return record["torque_nm"].values[k * kJoints + j]; };
+  const double held_until = static_cast<double>(last) * kSamplePeriod + delay[last] + 0.02;
+  std::int64_t braked = 0;
+  for (std::size_t k = last + 1; k < kSamples; ++k) {
+    const bool held = static_cast<double>(k + 1) * kSamplePeriod <= held_until + 1e-12;
+    braked += held ? 0 : 1;
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      const double speed = record["speed_rad_s"].values[k * kJoints + j];
+      ASSERT_EQ(torque(k, j), held ? torque(last, j) : -settings.brake_nm_s[j] * speed) << "sample " << k;
+    }
+  }
+  EXPECT_EQ(report.watchdog_samples, braked);
+  EXPECT_GT(braked, 0);
+}
+
+TEST(PlantLoop, brakes_each_joint_with_the_time_constant_asked_for) {
+  // A point mass m at distance l: inertia m l^2, so b = m l^2 / tau.
+  Scenario pendulum = scenario(10);
+  pendulum.plant = ::quasilpv::testing::point_pendulum(0.7);
+  pendulum.external_torque.clear();
+  EXPECT_NEAR(viscous_brake(pendulum, 0.05)[0], 0.49 / 0.05, 1e-9);
+}
+
+TEST(ControlLoop, when_artifact_and_trajectory_differ_in_joints_expect_refusal) {
+  const Artifact two = Artifact::parse(json_twin(artifact_table("pid", 2)), "test");
+  EXPECT_THROW(ControlLoop(two, trajectory(), {}), InputError);
+}
+
+TEST(ControlLoop, when_samples_are_missing_expect_the_steps_of_a_controller_without_measurement) {
+  ControlLoop loop(artifact(), trajectory(), {});
+  Controller controller(artifact());
+  const Trajectory reference = trajectory();
+  StepReport expected;
+  for (const std::int64_t seq : {0, 1, 2, 3, 4, 5}) {
+    StepInput input;
+    input.seq = seq;
+    input.valid = seq == 0 || seq == 1 || seq == 5;
+    input.angle = input.valid ? kStart : JointArray{};
+    input.reference = reference.evaluate(static_cast<double>(seq) * kSamplePeriod);
+    expected = controller.step(input);
+    if (input.valid) {
+      loop.handle(measurement(seq), at(seq));
+    }
+  }
+  EXPECT_EQ(torque_of(loop), expected.torque_applied);
+  EXPECT_EQ(loop.predicted_steps(), 3);
+  EXPECT_EQ(loop.steps(), 6);
+  EXPECT_EQ(loop.state(), ControllerState::kRunning);
+}
+
+TEST(ControlLoop, when_20_samples_are_missing_expect_a_latched_fault_and_a_bounded_number_of_steps) {
+  for (const std::int64_t next : {21LL, 22LL, 1'000'000'000LL}) {
+    ControlLoop loop(artifact(), trajectory(), {});
+    loop.handle(measurement(0), at(0));
+    loop.handle(measurement(next), at(next));
+    EXPECT_EQ(loop.state(), ControllerState::kFault) << next;
+    EXPECT_EQ(loop.cause(), FaultCause::kMeasurementLost);
+    EXPECT_EQ(loop.steps(), 22);
+  }
+}
+
+TEST(ControlLoop, when_19_samples_are_missing_expect_no_fault) {
+  ControlLoop loop(artifact(), trajectory(), {});
+  loop.handle(measurement(0), at(0));
+  loop.handle(measurement(20), at(20));
+  EXPECT_EQ(loop.predicted_steps(), 19);
+  EXPECT_EQ(loop.state(), ControllerState::kRunning);
+}
+
+TEST(ControlLoop, when_one_measurement_is_nan_expect_prediction_flag_and_a_normal_next_sample) {
+  ControlLoop loop(artifact(), trajectory(), {});
+  loop.handle(measurement(0), at(0));
+  loop.handle(measurement(1, {kStart[0], kNaN, kStart[2]}), at(1));
+  EXPECT_EQ(loop.state(), ControllerState::kDegraded);
+  EXPECT_EQ(loop.command().flags & kMeasurementInvalid, kMeasurementInvalid);
+  for (const double torque : torque_of(loop)) {
+    EXPECT_TRUE(std::isfinite(torque));
+  }
+  loop.handle(measurement(2), at(2));
+  EXPECT_EQ(loop.state(), ControllerState::kRunning);
+  EXPECT_EQ(loop.command().flags & kMeasurementInvalid, 0);
+  EXPECT_EQ(loop.predicted_steps(), 1);
+}
+
+class AfterAFault : public ::testing::TestWithParam<SafeAction> {};
+
+TEST_P(AfterAFault, reaches_the_safe_torque_within_50_ms_without_a_jump_and_stays_there) {
+  LoopSettings settings;
+  settings.safe_action = GetParam();
+  ControlLoop loop(artifact(), trajectory(), settings);
+  loop.handle(measurement(0), at(0));
+  std::int64_t seq = 1;
+  for (; loop.state() != ControllerState::kFault; ++seq) {
+    ASSERT_LE(seq, 20);
+    loop.handle(measurement(seq, {kNaN, kNaN, kNaN}), at(seq));
+  }
+  const JointArray at_fault = torque_of(loop);
+  JointArray safe{};
+  for (std::size_t j = 0; j < kJoints && GetParam() == SafeAction::kGravity; ++j) {
+    safe[j] = 9.81 * static_cast<double>(j + 1) * std::sin(kStart[j]);
+  }
+  for (std::int64_t sample = 0; sample < 200; ++sample, ++seq) {
+    loop.handle(measurement(seq), at(seq));
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      const double torque = torque_of(loop)[j];
+      ASSERT_LE(std::abs(torque - safe[j]), std::abs(at_fault[j] - safe[j]) + 1e-9);
+      if (sample >= 50) {
+        ASSERT_DOUBLE_EQ(torque, safe[j]);
+      }
+    }
+  }
+  EXPECT_EQ(loop.state(), ControllerState::kFault);
+  EXPECT_TRUE(loop.is_safe(seq * kMillisecond));
+}
+
+INSTANTIATE_TEST_SUITE_P(ControlLoop, AfterAFault, ::testing::Values(SafeAction::kZero, SafeAction::kGravity),
+                         [](const auto& action) { return action.param == SafeAction::kZero ? "zero" : "gravity"; });
+
+/// A controller on a thread of its own; the test plays the plant.
+class RunningController : public ::testing::Test {
+ protected:
+  void start(const ControllerRunSettings& settings) {
+    thread_ = std::thread([this, settings] {
+      report_ = run_controller(loop_, *ends_.first, nullptr, settings, stop_);
+      finished_ = true;
+    });
+  }
+
+  ControllerRunReport finish() {
+    thread_.join();
+    return report_;
+  }
+
+  void TearDown() override {
+    if (thread_.joinable()) {
+      stop_ = true;
+      thread_.join();
+    }
+  }
+
+  /// The next command of at least `seq`.
+  command_v1 await_command(std::int64_t seq) {
+    command_v1 command{};
+    const std::int64_t end_ns = monotonic_ns() + kPatience;
+    while (monotonic_ns() < end_ns) {
+      plant_.receive(10 * kMillisecond);
+      if (plant_.take(command) && command.seq >= seq) {
+        return command;
+      }
+    }
+    ADD_FAILURE() << "no command " << seq;
+    return command;
+  }
+
+  Artifact law_ = artifact();
+  std::pair<std::unique_ptr<InProcessLink>, std::unique_ptr<InProcessLink>> ends_ =
+      InProcessLink::create_pair(identity_of(law_));
+  InProcessLink& plant_ = *ends_.second;
+  ControlLoop loop_{law_, trajectory(), {}};
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> finished_{false};
+  ControllerRunReport report_;
+  std::thread thread_;
+};
+
+TEST_F(RunningController, when_a_measurement_is_repeated_in_lock_step_expect_the_same_command_and_one_step) {
+  start({});
+  plant_.send(measurement(0));
+  const command_v1 first = await_command(0);
+  plant_.send(measurement(0, {1.0, 1.0, 1.0}));
+  const command_v1 again = await_command(0);
+  EXPECT_EQ(again.seq, first.seq);
+  for (int j = 0; j < kJoints; ++j) {
+    EXPECT_EQ(again.torque_nm[j], first.torque_nm[j]);
+  }
+  plant_.send(EventCode::kEnded, 1);
+  const ControllerRunReport report = finish();
+  EXPECT_EQ(report.end, ControllerRunEnd::kPlantEnded);
+  EXPECT_EQ(report.commands, 2);
+  EXPECT_EQ(report.repeated, 1);
+  EXPECT_EQ(loop_.steps(), 1);
+}
+
+TEST_F(RunningController, when_a_measurement_is_repeated_in_real_time_expect_one_command) {
+  ControllerRunSettings settings;
+  settings.pace = Pace::kRealTime;
+  settings.silence_s = 5.0;
+  start(settings);
+  for (int copy = 0; copy < 3; ++copy) {
+    plant_.send(measurement(0));
+  }
+  await_command(0);
+  plant_.send(measurement(0));
+  plant_.send(EventCode::kEnded, 1);
+  EXPECT_EQ(finish().commands, 1);
+}
+
+TEST_F(RunningController, when_the_plant_falls_silent_in_real_time_expect_a_fault_and_safe_torque_without_being_asked) {
+  ControllerRunSettings settings;
+  settings.pace = Pace::kRealTime;
+  settings.timeout_s = 0.5;
+  start(settings);
+  plant_.send(measurement(0, {0.5, 0.0, 0.0}));
+  await_command(0);
+  command_v1 command = await_command(1);
+  EXPECT_EQ(command.state, static_cast<std::int32_t>(ControllerState::kFault));
+  const std::int64_t end_ns = monotonic_ns() + kPatience;
+  const auto is_zero = [&command] {
+    return std::all_of(std::begin(command.torque_nm), std::end(command.torque_nm), [](double t) { return t == 0.0; });
+  };
+  while (!is_zero() && monotonic_ns() < end_ns) {
+    command = await_command(command.seq + 1);
+  }
+  EXPECT_TRUE(is_zero());
+  event_v1 event{};
+  ASSERT_TRUE(plant_.take(event));
+  EXPECT_EQ(finish().end, ControllerRunEnd::kPlantSilent);
+  EXPECT_EQ(loop_.cause(), FaultCause::kPlantSilent);
+}
+
+TEST_F(RunningController, when_a_fault_is_to_end_the_run_expect_an_end_after_the_safe_torque) {
+  ControllerRunSettings settings;
+  settings.exit_on_fault = true;
+  start(settings);
+  plant_.send(measurement(0));
+  await_command(0);
+  for (std::int64_t seq = 100; seq < 200; ++seq) {
+    plant_.send(measurement(seq));
+    if (await_command(seq).seq < seq || loop_.is_safe(seq * kMillisecond)) {
+      break;
+    }
+  }
+  EXPECT_EQ(finish().end, ControllerRunEnd::kFault);
+  EXPECT_EQ(loop_.command().torque_nm[0], 0.0);
+}
+
+TEST_F(RunningController, when_asked_to_stop_expect_the_safe_torque_before_the_end) {
+  start({});
+  plant_.send(measurement(0, {0.5, 0.0, 0.0}));
+  EXPECT_NE(await_command(0).torque_nm[0], 0.0);
+  stop_ = true;
+  for (std::int64_t seq = 1; seq < 100 && !finished_; ++seq) {
+    plant_.send(measurement(seq));
+    plant_.receive(20 * kMillisecond);
+  }
+  EXPECT_EQ(finish().end, ControllerRunEnd::kStopped);
+  EXPECT_EQ(loop_.cause(), FaultCause::kStopRequested);
+  EXPECT_EQ(loop_.command().torque_nm[0], 0.0);
+}
+
+TEST_F(RunningController, when_no_plant_is_there_expect_an_end_after_the_timeout) {
+  ControllerRunSettings settings;
+  settings.timeout_s = 0.05;
+  start(settings);
+  EXPECT_EQ(finish().end, ControllerRunEnd::kPlantNeverHeard);
+}
+
+}  // namespace
+}  // namespace quasilpv
