@@ -196,7 +196,7 @@ class ComputedTorque:
         commanded = M @ np.asarray(sum(terms)) + bias
         applied = self.output.apply(commanded)
         self.integral = integrate(integral, error, self.gi, T, commanded - applied)
-        self.a_hat, self.before = a_hat, (w, np.linalg.solve(M, applied - bias))
+        self.a_hat, self.before = a_hat, (w, np.asarray(np.linalg.solve(M, applied - bias), dtype=np.float64))
         summands = (*(np.abs(M) @ np.abs(term) for term in terms), bias)
         return Answer(commanded, applied, M @ a_hat, summands)
 

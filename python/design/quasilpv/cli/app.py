@@ -1,0 +1,111 @@
+"""The application: its verbs, and the one place where exceptions become a line on stderr and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from quasilpv import __version__
+from quasilpv.cli import hil, inspect, listing, synth, track
+from quasilpv.errors import (
+    ClaimError,
+    FaultStop,
+    InfeasibleError,
+    InputError,
+    PlantError,
+    QuasilpvError,
+    TransportError,
+)
+
+EXIT_CODES: tuple[tuple[type[QuasilpvError], int], ...] = (
+    (InfeasibleError, 1),
+    (ClaimError, 1),
+    (InputError, 2),
+    (FaultStop, 3),
+    (TransportError, 5),
+    (PlantError, 6),
+)
+EXIT_INTERRUPTED = 130
+
+HELP = """Control design for nonlinear descriptor systems and robots, from the model to the tracked trajectory.
+
+\b
+Examples:
+  design list
+  design synth arm3 -o out/arm3
+  design inspect out/arm3/artifact.json
+  design track serial-square serial-circle
+  design hil serial-square --real-time
+
+\b
+Exit codes:
+  0 done              1 infeasible, or a claim does not hold
+  2 bad input         3 fault stop
+  5 no transport      6 plant failure
+"""
+
+app = typer.Typer(
+    name="design",
+    help=HELP,
+    no_args_is_help=False,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
+)
+
+
+def _print_version(value: bool) -> None:
+    if value:
+        typer.echo(f"design {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    version: bool = typer.Option(False, "--version", callback=_print_version, is_eager=True, help="Print the version."),
+) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+app.command("list")(listing.list_command)
+app.command("synth")(synth.synth_command)
+app.command("inspect")(inspect.inspect_command)
+app.command("track")(track.track_command)
+app.command("hil")(hil.hil_command)
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run the command with the given arguments and return its exit code; errors are one line on stderr.
+
+    Args:
+        arguments: the command line without the program's name.
+    """
+    try:
+        code = app(args=list(arguments), prog_name="design", standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except typer.TyperException as error:
+        return _fail(f"command line: {error.format_message()} (design --help explains)", 2)
+    except QuasilpvError as error:
+        codes = (code for kind, code in EXIT_CODES if isinstance(error, kind))
+        return _fail(str(error), next(codes, 1))
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail("interrupted", EXIT_INTERRUPTED)
+    except BrokenPipeError:  # the reader of a pipe has left: nobody is there to be told
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def main() -> None:
+    """Entry point of the command ``design``."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def _fail(message: str, code: int) -> int:
+    print("error:", " ".join(message.split()), file=sys.stderr)
+    return code

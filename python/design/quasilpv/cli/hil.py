@@ -1,0 +1,105 @@
+"""``design hil``: one scenario with controller and plant as two processes over LCM."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import typer
+
+from quasilpv.artifact import read_artifact
+from quasilpv.cli.console import JsonOption, print_json, print_table, progress
+from quasilpv.cli.options import (
+    ArtifactOption,
+    EncoderOption,
+    PlantOption,
+    RateOption,
+    designed,
+    plant_kind,
+    require_controller,
+    sensors_of,
+)
+from quasilpv.cli.results import print_results
+from quasilpv.experiments.hil import HilResult, Mode, require_identical, run_over_lcm
+from quasilpv.experiments.result import TrackResult, Variant
+from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
+from quasilpv.scenarios import ENCODER_BITS
+from quasilpv.synthesis import DEFAULT_CONTROLLER
+
+LATENCIES = ("wakeup_ns", "round_trip_ns")
+QUANTILES = ("p50", "p99", "p99_9", "max")
+
+
+def hil_command(
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario id, see design list.")],
+    *,
+    real_time: Annotated[bool, typer.Option("--real-time", help="Paced by the clock instead of lock-step.")] = False,
+    controller: Annotated[str, typer.Option("--controller", metavar="ID")] = DEFAULT_CONTROLLER,
+    artifact: ArtifactOption = None,
+    rate_hz: RateOption = None,
+    encoder_bits: EncoderOption = None,
+    plant: PlantOption = "perturbed",
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for run files and records.")] = Path(
+        "out/hil"
+    ),
+    json: JsonOption = False,
+) -> None:
+    """Run a scenario with controller and plant as two processes over LCM, and once more in this process.
+
+    In lock-step both runs must be identical, bit for bit (exit code 1 if they are not). With --real-time the rms of
+    both is printed with the measured wake-up and round-trip latencies beside it.
+
+    \b
+    Example:
+      design hil serial-square --real-time
+    """
+    experiment = TrackingExperiment.registered(scenario)
+    kind = cast(PlantKind, plant_kind(plant))
+    variant = Variant(require_controller(controller), ENCODER_BITS if encoder_bits is None else encoder_bits)
+    sensors = sensors_of(variant.encoder_bits)
+    with progress(2) as steps:
+        steps.begin("in process")
+        chosen = (
+            designed(experiment.robot.id, variant, rate_hz, steps.parts)
+            if artifact is None
+            else read_artifact(artifact)
+        )
+        folder = out / experiment.name / chosen.law.kind
+        in_process = track(experiment, chosen, folder, plant=kind, sensors=sensors)
+        steps.end()
+        steps.begin("over LCM")
+        mode: Mode = "realtime" if real_time else "lockstep"
+        over_lcm = run_over_lcm(experiment, chosen, folder, plant=kind, sensors=sensors, mode=mode)
+        steps.end()
+    if not real_time:
+        require_identical(over_lcm.result.run, in_process.run)
+    if json:
+        print_json(_row(over_lcm, in_process))
+    else:
+        _print(over_lcm, in_process)
+
+
+def _row(over_lcm: HilResult, in_process: TrackResult) -> dict[str, Any]:
+    return {
+        **over_lcm.result.row(),
+        "mode": over_lcm.mode,
+        "samples": int(over_lcm.result.run.time_s.size),
+        "identical_to_in_process": over_lcm.result.run.first_difference(in_process.run) is None,
+        "in_process": in_process.metrics.as_dict(),
+        "controller_report": over_lcm.controller,
+        "simulator_report": over_lcm.simulator,
+    }
+
+
+def _print(over_lcm: HilResult, in_process: TrackResult) -> None:
+    print_results([in_process])
+    print_results([over_lcm.result])
+    rows = [
+        (name.removesuffix("_ns").replace("_", " "), *(f"{over_lcm.simulator[name][q] / 1e3:.1f}" for q in QUANTILES))
+        for name in LATENCIES
+    ]
+    print_table(f"over LCM, {over_lcm.mode}, latency in us", ("", *QUANTILES), rows)
+    counters = ("missed_commands", "late_commands", "watchdog_samples", "overruns")
+    print(", ".join(f"{name.replace('_', ' ')} {over_lcm.simulator[name]}" for name in counters))
+    if over_lcm.mode == "lockstep":
+        print(f"{over_lcm.result.run.time_s.size} samples, identical to the run in process")

@@ -1,0 +1,27 @@
+"""``design list``: what there is."""
+
+from __future__ import annotations
+
+from quasilpv.cli.console import JsonOption, print_json, print_table
+from quasilpv.scenarios import tracking_tasks
+from quasilpv.synthesis import CONTROLLERS
+from quasilpv.systems.registry import robots
+
+
+def list_command(json: JsonOption = False) -> None:
+    """List robots, controllers and scenarios.
+
+    \b
+    Example:
+      design list --json
+    """
+    known = {
+        "robots": [{"id": robot.id, "summary": robot.summary} for robot in robots()],
+        "controllers": [{"id": name, "summary": summary} for name, summary in CONTROLLERS.items()],
+        "scenarios": [{"id": task.id, "summary": task.summary, "robot": task.robot} for task in tracking_tasks()],
+    }
+    if json:
+        print_json(known)
+        return
+    for kind, entries in known.items():
+        print_table(kind, ("", ""), [(f"  {entry['id']}", entry["summary"]) for entry in entries], left_columns=2)

@@ -1,0 +1,87 @@
+"""Options that mean the same in several verbs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import typer
+
+from quasilpv.artifact import Artifact
+from quasilpv.errors import InputError
+from quasilpv.experiments.designs import kept_design
+from quasilpv.experiments.result import Variant
+from quasilpv.scenarios import ENCODER_BITS, Sensors
+from quasilpv.synthesis import CONTROLLERS, Specification
+from quasilpv.synthesis.acceleration_design import Progress
+
+RateOption: TypeAlias = Annotated[
+    float | None, typer.Option("--rate-hz", help="Sample rate; the controller is designed for it.  [default: 1000]")
+]
+EncoderOption: TypeAlias = Annotated[
+    int | None,
+    typer.Option("--encoder-bits", help=f"Encoder resolution, 0 for exact angles.  [default: {ENCODER_BITS}]"),
+]
+PlantOption: TypeAlias = Annotated[
+    str, typer.Option("--plant", help="nominal, or perturbed: the full payload the design must cover.")
+]
+ArtifactOption: TypeAlias = Annotated[
+    Path | None, typer.Option("--artifact", metavar="FILE", help="Use this controller instead of designing one.")
+]
+
+
+def plant_kind(text: str) -> str:
+    """``nominal`` or ``perturbed``.
+
+    Raises:
+        InputError: neither.
+    """
+    if text not in ("nominal", "perturbed"):
+        raise InputError("command line", "--plant", text, "nominal or perturbed")
+    return text
+
+
+def sensors_of(encoder_bits: int) -> Sensors:
+    """Sensors with encoders of this resolution and the registry's speed noise.
+
+    Raises:
+        InputError: not 0 to 32 bits.
+    """
+    if not 0 <= encoder_bits <= 32:
+        raise InputError("command line", "--encoder-bits", encoder_bits, "0 (exact angles) to 32")
+    return Sensors(encoder_bits=encoder_bits)
+
+
+def require_controller(controller: str) -> str:
+    """A controller id.
+
+    Raises:
+        InputError: unknown.
+    """
+    if controller not in CONTROLLERS:
+        raise InputError("command line", "controller", controller, f"one of {', '.join(CONTROLLERS)}")
+    return controller
+
+
+def specification(rate_hz: float | None, encoder_bits: int | None) -> Specification:
+    """The specification for a rate and for encoders; what is not given, and exact angles, keep their default.
+
+    Raises:
+        InputError: out of range.
+    """
+    defaults = Specification()
+    return Specification(
+        rate_hz=defaults.rate_hz if rate_hz is None else rate_hz,
+        encoder_bits=encoder_bits or defaults.encoder_bits,
+    )
+
+
+def designed(robot_id: str, variant: Variant, rate_hz: float | None, progress: Progress) -> Artifact:
+    """The controller of a variant, designed for its encoders; from the cache if it was designed before."""
+    return kept_design(
+        robot_id,
+        variant.controller,
+        specification(rate_hz, variant.encoder_bits),
+        disturbance_compensation=variant.compensated,
+        progress=progress,
+    )

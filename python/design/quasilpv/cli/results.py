@@ -1,0 +1,42 @@
+"""The table of tracking results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from quasilpv.cli.console import print_table
+from quasilpv.experiments.result import TrackResult
+
+COLUMNS = (
+    "controller",
+    "rms X\nmm",
+    "rms Y\nmm",
+    "max X\nmm",
+    "max Y\nmm",
+    "torque\nrms N m",
+    "increment\nrms N m",
+    "speed error\nrms rad/s",
+    "growth rate\n1/s",
+)
+
+
+def print_results(results: Sequence[TrackResult]) -> None:
+    """Print one table per scenario on stdout."""
+    for scenario in dict.fromkeys(result.scenario for result in results):
+        own = [result for result in results if result.scenario == scenario]
+        rates = sorted({result.rate_hz for result in own})
+        title = f"{scenario}, {own[0].plant} plant, {', '.join(f'{rate:g}' for rate in rates)} Hz"
+        print_table(title, COLUMNS, [_cells(result) for result in own])
+
+
+def _cells(result: TrackResult) -> list[str]:
+    metrics, growth = result.metrics, result.worst_growth_rate_per_s
+    lengths = (metrics.rms_x_m, metrics.rms_y_m, metrics.mav_x_m, metrics.mav_y_m)
+    return [
+        result.variant.label,
+        *(f"{1e3 * length:.3g}" for length in lengths),
+        f"{metrics.rms_torque_nm:.0f}",
+        f"{metrics.rms_torque_increment_nm:.0f}",
+        f"{metrics.rms_velocity_error_rad_s:.2g}",
+        "-" if growth is None else f"{growth:.2f}",
+    ]

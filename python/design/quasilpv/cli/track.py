@@ -1,0 +1,150 @@
+"""``design track``: scenarios in closed loop, in this process; a table and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, cast
+
+import typer
+
+from quasilpv.artifact import Artifact, read_artifact
+from quasilpv.artifact.files import write_atomically
+from quasilpv.cli.console import JsonOption, Steps, print_json, print_note, progress, to_json
+from quasilpv.cli.options import (
+    ArtifactOption,
+    EncoderOption,
+    PlantOption,
+    RateOption,
+    designed,
+    plant_kind,
+    require_controller,
+    sensors_of,
+    specification,
+)
+from quasilpv.cli.results import print_results
+from quasilpv.errors import InputError
+from quasilpv.experiments.result import TrackResult, Variant
+from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
+from quasilpv.figures.gallery import write_comparison, write_gallery
+from quasilpv.scenarios import ENCODER_BITS
+from quasilpv.synthesis import DEFAULT_CONTROLLER
+
+DEFAULT_CONTROLLERS = ("pid", "ctc", "ctc-dob", "dob-acceleration")
+COARSE_ENCODER_BITS = 17
+PATH_ROBOT = "arm3"
+
+
+@dataclass(frozen=True)
+class _Session:
+    """What all runs of one command have in common."""
+
+    given: Artifact | None
+    rate_hz: float
+    plant: PlantKind
+    out: Path
+
+    def run(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> TrackResult:
+        artifact = self.given or designed(experiment.robot.id, variant, self.rate_hz, progress=steps.parts)
+        folder = self.out / experiment.name / variant.slug
+        return track(experiment, artifact, folder, plant=self.plant, sensors=sensors_of(variant.encoder_bits))
+
+
+def track_command(
+    scenarios: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="SCENARIO...", help="Scenario ids, see design list.", show_default=False),
+    ] = None,
+    *,
+    controllers: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--controller", metavar="ID", help=f"May be repeated.  [default: {', '.join(DEFAULT_CONTROLLERS)}]"
+        ),
+    ] = None,
+    artifact: ArtifactOption = None,
+    rate_hz: RateOption = None,
+    trajectory: Annotated[
+        Path | None,
+        typer.Option("--trajectory", metavar="FILE", help="Follow the waypoints and arcs of this file as well."),
+    ] = None,
+    encoder_bits: EncoderOption = None,
+    plant: PlantOption = "perturbed",
+    no_compensation: Annotated[
+        bool, typer.Option("--no-compensation", help="Observe the disturbance, do not compensate it.")
+    ] = False,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for run files and figures.")] = Path(
+        "out/track"
+    ),
+    figures: Annotated[
+        bool | None, typer.Option("--figures/--no-figures", help="Draw figures.  [default: not with --json]")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Run scenarios in closed loop: every controller, one table, figures of every run.
+
+    By default the default controller also runs once with 17-bit encoders, designed for them. Designs are kept in
+    out/cache and made again when anything they depend on changes.
+
+    \b
+    Example:
+      design track serial-square serial-circle --controller dob-acceleration
+    """
+    experiments = [TrackingExperiment.registered(name) for name in dict.fromkeys(scenarios or [])]
+    if trajectory is not None:
+        experiments.append(TrackingExperiment.from_path_file(trajectory, PATH_ROBOT))
+    if not experiments:
+        raise InputError("command line", "SCENARIO", "nothing", "at least one scenario id or --trajectory FILE")
+    given = None if artifact is None else _given(artifact, controllers, rate_hz, no_compensation)
+    variants = _variants(given, controllers, encoder_bits, no_compensation)
+    session = _Session(given, specification(rate_hz, None).rate_hz, cast(PlantKind, plant_kind(plant)), out)
+    results = []
+    with progress(len(experiments) * len(variants)) as steps:
+        for experiment in experiments:
+            for variant in variants:
+                steps.begin(f"{experiment.name}: {variant.label}")
+                results.append(session.run(experiment, variant, steps))
+                steps.end()
+    write_atomically({out / "results.json": to_json([result.row() for result in results]).encode()})
+    if not json if figures is None else figures:
+        _draw(results, out)
+    if json:
+        print_json([result.row() for result in results])
+    else:
+        print_results(results)
+
+
+def _given(path: Path, controllers: Sequence[str] | None, rate_hz: float | None, no_compensation: bool) -> Artifact:
+    """The controller of --artifact, which leaves nothing to choose."""
+    chosen = {"--controller": controllers, "--rate-hz": rate_hz, "--no-compensation": no_compensation or None}
+    for option, value in chosen.items():
+        if value:
+            raise InputError("command line", option, value, "nothing beside --artifact, which fixes the controller")
+    return read_artifact(path)
+
+
+def _variants(
+    given: Artifact | None, controllers: Sequence[str] | None, encoder_bits: int | None, no_compensation: bool
+) -> list[Variant]:
+    bits = ENCODER_BITS if encoder_bits is None else encoder_bits
+    sensors_of(bits)
+    if given is not None:
+        return [Variant(given.law.kind, bits)]
+    if no_compensation:
+        return [Variant(require_controller(name), bits, False) for name in controllers or [DEFAULT_CONTROLLER]]
+    variants = [Variant(require_controller(name), bits) for name in controllers or DEFAULT_CONTROLLERS]
+    if not controllers and encoder_bits is None:
+        variants.append(Variant(DEFAULT_CONTROLLER, COARSE_ENCODER_BITS))
+    return variants
+
+
+def _draw(results: Sequence[TrackResult], out: Path) -> None:
+    with progress(len(results)) as steps:
+        for result in results:
+            steps.begin(f"figures: {result.title}")
+            write_gallery(result, out / result.scenario / result.variant.slug)
+            steps.end()
+    for scenario in dict.fromkeys(result.scenario for result in results):
+        write_comparison([result for result in results if result.scenario == scenario], out / scenario)
+    print_note(f"figures are under {out}")

@@ -1,0 +1,74 @@
+"""Designs kept on disk under the hash of everything they depend on, so that no design is made twice."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from pathlib import Path
+
+import quasilpv
+from quasilpv.artifact import Artifact, read_artifact, write_artifact
+from quasilpv.artifact.canonical import document_hash
+from quasilpv.artifact.store import JSON_NAME
+from quasilpv.errors import InputError
+from quasilpv.release import design_inputs, release
+from quasilpv.synthesis import Specification
+from quasilpv.synthesis.acceleration_design import Progress, no_progress
+from quasilpv.systems.registry import robot
+
+DEFAULT_CACHE = Path("out/cache")
+
+# The rooms whose code decides what a design is; a change in any of them makes every kept design stale.
+_DESIGN_ROOMS = ("systems", "polytopes", "lmi", "conditions", "synthesis", "artifact", "release.py")
+
+
+def kept_design(
+    robot_id: str,
+    controller: str,
+    specification: Specification,
+    *,
+    disturbance_compensation: bool = True,
+    folder: Path = DEFAULT_CACHE,
+    progress: Progress = no_progress,
+) -> Artifact:
+    """The artifact of a design, from the cache if the same design was made before.
+
+    Args:
+        robot_id: name in the registry of robots.
+        controller: one of `quasilpv.synthesis.CONTROLLERS`.
+        specification: what is asked for.
+        disturbance_compensation: of `dob-acceleration`.
+        folder: the cache; each design is a folder of it, named by the hash of its inputs and of the design code.
+        progress: called with (points done, points in all) while a design is made.
+
+    Raises:
+        InputError: unknown robot or controller, or the cache cannot be written.
+        InfeasibleError: no design meets the specification.
+    """
+    inputs = {
+        "controller": controller,
+        "specification": specification.to_document(),
+        "disturbance_compensation": disturbance_compensation,
+        "code": _code_digest(),
+    }
+    place = folder / document_hash(design_inputs(robot(robot_id), inputs))[:32]
+    try:
+        return read_artifact(place / JSON_NAME)
+    except InputError:  # not there, or damaged: made again
+        made = release(
+            robot_id, controller, specification, disturbance_compensation=disturbance_compensation, progress=progress
+        )
+        write_artifact(place, made.artifact)
+        return made.artifact
+
+
+@cache
+def _code_digest() -> str:
+    """SHA-256 over the sources of the design rooms, in a fixed order."""
+    root = Path(quasilpv.__file__).parent
+    digest = hashlib.sha256()
+    for room in _DESIGN_ROOMS:
+        place = root / room
+        for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+            digest.update(f"{path.relative_to(root)}\0".encode() + path.read_bytes() + b"\0")
+    return digest.hexdigest()

@@ -1,0 +1,202 @@
+"""The same experiment with controller and plant as two processes over LCM, in lock-step or in real time."""
+
+from __future__ import annotations
+
+import csv
+import json
+import secrets
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from quasilpv.artifact import Artifact
+from quasilpv.errors import ClaimError, FaultStop, InputError, PlantError, QuasilpvError, TransportError
+from quasilpv.experiments.result import TrackResult
+from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.experiments.track import (
+    PlantKind,
+    RunFiles,
+    TrackingExperiment,
+    run_from_columns,
+    summarise,
+    write_run_files,
+)
+from quasilpv.scenarios import Sensors
+
+Mode: TypeAlias = Literal["lockstep", "realtime"]
+
+CONTROLLER, SIMULATOR = "qlpv-controller", "qlpv-simulator"
+MULTICAST_GROUP = "239.255.76.67"
+POLL_S = 0.02
+SILENCE_S = 10.0
+"""A process gives up after so long without the other one."""
+LOCK_STEP_LIMIT_S = 600.0
+"""Nothing in lock-step bounds the run but the processes; this does."""
+
+_ERRORS: dict[int, type[QuasilpvError]] = {3: FaultStop, 5: TransportError, 6: PlantError}
+
+
+@dataclass(frozen=True, eq=False)
+class HilResult:
+    """A run over LCM.
+
+    Attributes:
+        mode: ``"lockstep"`` or ``"realtime"``.
+        result: the numbers of the run.
+        controller: what `qlpv-controller` reports: steps, counters, latencies in ns.
+        simulator: what `qlpv-simulator` reports, likewise.
+    """
+
+    mode: Mode
+    result: TrackResult
+    controller: dict[str, Any]
+    simulator: dict[str, Any]
+
+
+def run_over_lcm(
+    experiment: TrackingExperiment, artifact: Artifact, folder: Path, *, plant: PlantKind, sensors: Sensors, mode: Mode
+) -> HilResult:
+    """Run controller and plant as two processes on this machine, with a session and a port of their own.
+
+    Args:
+        experiment: what is tracked.
+        artifact: the controller.
+        folder: where the run's files and both records are written.
+        plant: the true plant.
+        sensors: encoders and speed noise.
+        mode: lock-step (deterministic) or real time.
+
+    Raises:
+        InputError: robot and controller do not fit, an executable is missing, or the folder cannot be written.
+        FaultStop: the controller stopped the run.
+        TransportError: the processes did not hear each other.
+        PlantError: the plant could not be integrated.
+    """
+    files = write_run_files(folder, experiment, artifact, plant=plant, sensors=sensors)
+    records = {CONTROLLER: folder / "controller.csv", SIMULATOR: folder / "plant.csv"}
+    commands = _commands(files, records, mode)
+    limit_s = LOCK_STEP_LIMIT_S if mode == "lockstep" else experiment.trajectory.duration_s + 4 * SILENCE_S
+    reports = _run_both(commands, limit_s)
+    run = merge_records(records[SIMULATOR], records[CONTROLLER], artifact)
+    return HilResult(
+        mode,
+        summarise(run, experiment, artifact, plant=plant, sensors=sensors),
+        reports[CONTROLLER],
+        reports[SIMULATOR],
+    )
+
+
+def require_identical(over_lcm: Run, in_process: Run) -> None:
+    """Check that a lock-step run over LCM and a run in one process are the same, bit for bit.
+
+    Raises:
+        ClaimError: they differ; the message says where first.
+    """
+    difference = over_lcm.first_difference(in_process)
+    if difference is not None:
+        raise ClaimError(f"lock-step over LCM and in process: {difference}, expected identical samples")
+
+
+def merge_records(plant_csv: Path, controller_csv: Path, artifact: Artifact) -> Run:
+    """The record of a run from the records of both processes, matched by sample number.
+
+    Samples that only one side has (real time: a lost message) are left out.
+
+    Raises:
+        InputError: a record is missing, damaged, or they have no sample in common.
+    """
+    n = artifact.joints
+    plant, controller = (read_record(path, n) for path in (plant_csv, controller_csv))
+    _, in_plant, in_controller = np.intersect1d(plant["seq"], controller["seq"], return_indices=True)
+    if in_plant.size == 0:
+        raise InputError(str(controller_csv), "seq", "no sample", f"samples that {plant_csv} has too")
+    columns = {name: values[in_controller] for name, values in controller.items()}
+    columns.update({name: values[in_plant] for name, values in plant.items()})
+    return run_from_columns(columns, n, artifact.sample_period_s)
+
+
+def read_record(path: Path, joints: int) -> dict[str, FloatArray]:
+    """Columns of a record by name; ``name_0 ... name_(n-1)`` become one column of shape (N, n).
+
+    Raises:
+        InputError: the file cannot be read, or is not a table of numbers.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            header, *rows = list(csv.reader(file))
+        table = np.array(rows, dtype=np.float64).reshape(len(rows), len(header))
+    except (OSError, ValueError) as error:
+        raise InputError(str(path), "record", error, "a table of numbers under one line of names") from error
+    columns: dict[str, FloatArray] = {}
+    for index, name in enumerate(header):
+        stem, _, suffix = name.rpartition("_")
+        if joints > 1 and suffix == "0":
+            columns[stem] = table[:, index : index + joints]
+        elif not (suffix.isdigit() and stem in columns):
+            columns[name] = table[:, index]
+    return columns
+
+
+def find_executable(name: str) -> str:
+    """Path of an executable of the project: beside the running interpreter, else on PATH.
+
+    Raises:
+        InputError: it is in neither place.
+    """
+    folder = Path(sys.executable).parent
+    found = shutil.which(name, path=str(folder)) or shutil.which(name)
+    if found is None:
+        raise InputError("installation", name, "no such executable", f"it in {folder} or on PATH (pip install .)")
+    return found
+
+
+def _commands(files: RunFiles, records: dict[str, Path], mode: Mode) -> dict[str, list[str]]:
+    port = 49152 + secrets.randbelow(65536 - 49152)
+    common = ["--artifact", str(files.artifact), "--session", str(1 + secrets.randbelow(2**31 - 1))]
+    common += ["--url", f"udpm://{MULTICAST_GROUP}:{port}?ttl=0", "--mode", mode]
+    common += ["--timeout-s", str(SILENCE_S), "--json"]
+    inputs = {CONTROLLER: ["--trajectory", str(files.trajectory)], SIMULATOR: ["--scenario", str(files.scenario)]}
+    return {
+        name: [find_executable(name), *common, *inputs[name], "--record", str(records[name])]
+        for name in (CONTROLLER, SIMULATOR)
+    }
+
+
+def _run_both(commands: dict[str, list[str]], limit_s: float) -> dict[str, dict[str, Any]]:
+    """Run the processes to their end and return their reports; if one fails, the others are stopped."""
+    processes = {
+        name: subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for name, command in commands.items()
+    }
+    try:
+        deadline = time.monotonic() + limit_s
+        while any(process.poll() is None for process in processes.values()):
+            if any(process.returncode for process in processes.values()):
+                break
+            if time.monotonic() > deadline:
+                raise TransportError(f"{' and '.join(commands)}: still running after {limit_s:g} s")
+            time.sleep(POLL_S)
+        failed = [name for name, process in processes.items() if process.returncode]
+        for name in failed:
+            _raise_failure(name, processes[name])
+        return {name: json.loads(process.communicate()[0]) for name, process in processes.items()}
+    finally:
+        for process in processes.values():
+            if process.poll() is None:
+                process.terminate()
+            process.communicate()
+
+
+def _raise_failure(program: str, process: subprocess.Popen[str]) -> None:
+    """Raise the exception that the exit code of an ended process stands for, with its own line as message."""
+    _, errors = process.communicate()
+    line = (errors.strip().splitlines() or [f"{program}: exit code {process.returncode}"])[-1]
+    if process.returncode == 2:
+        raise InputError(program, "input", line.removeprefix(f"{program}: "), "files both programs accept")
+    raise _ERRORS.get(process.returncode, QuasilpvError)(line)

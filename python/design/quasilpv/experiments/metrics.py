@@ -1,0 +1,75 @@
+"""The numbers of one closed-loop run: tracking error of the tool, torque, torque activity, speed estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from quasilpv.experiments.run import FloatArray, Run
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """Metrics over all samples from t = 0, no pre-roll.
+
+    Attributes:
+        rms_x_m: root mean square of the tool's error along X.
+        rms_y_m: the same along Y.
+        mav_x_m: maximum absolute value of the tool's error along X.
+        mav_y_m: the same along Y.
+        rms_torque_nm: sqrt(mean over samples of the sum over joints of torque^2).
+        rms_torque_increment_nm: the same of the differences of the torque between consecutive samples.
+        rms_velocity_error_rad_s: the same of estimated minus true joint speed.
+    """
+
+    rms_x_m: float
+    rms_y_m: float
+    mav_x_m: float
+    mav_y_m: float
+    rms_torque_nm: float
+    rms_torque_increment_nm: float
+    rms_velocity_error_rad_s: float
+
+    def as_dict(self) -> dict[str, float]:
+        """The metrics by name, in the order of the attributes."""
+        return asdict(self)
+
+
+def rms_over_samples(values: FloatArray) -> float:
+    """Root over the mean over samples of the sum over joints of squares: sqrt(1/N sum_k |v_k|^2).
+
+    Args:
+        values: (N, n), N >= 1.
+    """
+    return float(np.sqrt(np.mean(np.sum(np.square(values), axis=1))))
+
+
+def tool_error(run: Run, tool_position: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Position error of the tool, FK(true angle) - FK(reference angle).
+
+    Args:
+        run: the record.
+        tool_position: forward kinematics, (N, n) rad -> (N, 2) m in the base frame (X to the right, Y up).
+
+    Returns:
+        (N, 2) m. True angles, not measured ones: the encoder's rounding is not excused.
+    """
+    return tool_position(run.true_angle_rad) - tool_position(run.reference_angle_rad)
+
+
+def compute_metrics(run: Run, tool_position: Callable[[FloatArray], FloatArray]) -> Metrics:
+    """All metrics of one run; ``tool_position`` as in `tool_error`."""
+    error = tool_error(run, tool_position)
+    rms_x, rms_y = np.sqrt(np.mean(np.square(error), axis=0))
+    mav_x, mav_y = np.max(np.abs(error), axis=0)
+    return Metrics(
+        rms_x_m=float(rms_x),
+        rms_y_m=float(rms_y),
+        mav_x_m=float(mav_x),
+        mav_y_m=float(mav_y),
+        rms_torque_nm=rms_over_samples(run.torque_nm),
+        rms_torque_increment_nm=rms_over_samples(np.diff(run.torque_nm, axis=0)),
+        rms_velocity_error_rad_s=rms_over_samples(run.estimated_speed_rad_s - run.true_speed_rad_s),
+    )

@@ -1,0 +1,186 @@
+"""Tracking experiments in one process: a scenario, a controller, one closed-loop run, its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from quasilpv import _runtime
+from quasilpv.artifact import Artifact, write_artifact
+from quasilpv.artifact.canonical import canonical_json
+from quasilpv.errors import InputError
+from quasilpv.experiments.disturbance import true_disturbance
+from quasilpv.experiments.metrics import compute_metrics
+from quasilpv.experiments.result import TrackResult, Variant
+from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.scenarios import Sensors, build_scenario, tracking_task, write_scenario
+from quasilpv.systems.registry import Robot, robot
+from quasilpv.trajectories import Trajectory, plan, read_path, write_trajectory
+
+PlantKind: TypeAlias = Literal["nominal", "perturbed"]
+
+TRAJECTORY_NAME = "trajectory.json"
+SCENARIO_NAME = "scenario.json"
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingExperiment:
+    """What is tracked by which robot.
+
+    Attributes:
+        name: scenario id, or the name in the path file.
+        robot: from the registry.
+        trajectory: the reference.
+    """
+
+    name: str
+    robot: Robot
+    trajectory: Trajectory
+
+    @classmethod
+    def registered(cls, scenario_id: str) -> TrackingExperiment:
+        """The experiment of a scenario id.
+
+        Raises:
+            InputError: there is none of this name.
+        """
+        task = tracking_task(scenario_id)
+        task_robot = robot(task.robot)
+        return cls(task.id, task_robot, task.trajectory(task_robot.model, task_robot.domain))
+
+    @classmethod
+    def from_path_file(cls, path: Path | str, robot_id: str) -> TrackingExperiment:
+        """The experiment in which a robot follows the task-space path of a file.
+
+        Raises:
+            InputError: the file is not a path, or the path is unreachable, singular, or outside the modelling box.
+        """
+        task_robot = robot(robot_id)
+        trajectory = plan(task_robot.model, read_path(path), task_robot.domain, source=str(path))
+        return cls(trajectory.name, task_robot, trajectory)
+
+
+@dataclass(frozen=True)
+class RunFiles:
+    """The files of one run, as the executables and the bindings read them.
+
+    Attributes:
+        artifact: the controller.
+        trajectory: the reference.
+        scenario: the experiment, true plant included.
+    """
+
+    artifact: Path
+    trajectory: Path
+    scenario: Path
+
+
+def write_run_files(
+    folder: Path, experiment: TrackingExperiment, artifact: Artifact, *, plant: PlantKind, sensors: Sensors
+) -> RunFiles:
+    """Write artifact, trajectory and scenario of one run into ``folder``.
+
+    Raises:
+        InputError: the controller is for another robot, or the folder cannot be written.
+    """
+    if artifact.robot.id != experiment.robot.id:
+        raise InputError(
+            artifact.name, "robot.id", artifact.robot.id, f"{experiment.robot.id}, which {experiment.name} is for"
+        )
+    scenario = build_scenario(experiment.robot, experiment.trajectory, plant=plant, sensors=sensors)
+    return RunFiles(
+        artifact=write_artifact(folder, artifact)[0],
+        trajectory=write_trajectory(folder / TRAJECTORY_NAME, experiment.trajectory),
+        scenario=write_scenario(folder / SCENARIO_NAME, scenario),
+    )
+
+
+def track(
+    experiment: TrackingExperiment, artifact: Artifact, folder: Path, *, plant: PlantKind, sensors: Sensors
+) -> TrackResult:
+    """Run one controller on one experiment in closed loop, in this process.
+
+    Args:
+        experiment: what is tracked.
+        artifact: the controller.
+        folder: where the run's files are written; the run reads them from there.
+        plant: the true plant.
+        sensors: encoders and speed noise.
+
+    Raises:
+        InputError: robot and controller do not fit, or the folder cannot be written.
+        PlantError: the plant could not be integrated.
+    """
+    files = write_run_files(folder, experiment, artifact, plant=plant, sensors=sensors)
+    runtime = _runtime.Artifact.load(str(files.artifact))
+    columns = _runtime.run_closed_loop(
+        runtime, _runtime.Trajectory.load(str(files.trajectory)), _runtime.Scenario.load(str(files.scenario))
+    )
+    run = run_from_columns(columns, artifact.joints, artifact.sample_period_s)
+    return summarise(run, experiment, artifact, plant=plant, sensors=sensors)
+
+
+def run_from_columns(columns: dict[str, FloatArray], joints: int, sample_period_s: float) -> Run:
+    """The record of a run from the columns the run-time side names.
+
+    Args:
+        columns: by name, shape (N,) or (N, n).
+        joints: n.
+        sample_period_s: T.
+    """
+
+    def per_joint(name: str) -> FloatArray:
+        return columns[name].reshape(-1, joints)
+
+    return Run(
+        sample_period_s=sample_period_s,
+        time_s=columns["time_s"],
+        reference_angle_rad=per_joint("reference_angle_rad"),
+        reference_speed_rad_s=per_joint("reference_speed_rad_s"),
+        true_angle_rad=per_joint("angle_rad"),
+        true_speed_rad_s=per_joint("speed_rad_s"),
+        true_acceleration_rad_s2=per_joint("acceleration_rad_s2"),
+        measured_angle_rad=per_joint("measured_angle_rad"),
+        estimated_angle_rad=per_joint("estimated_angle_rad"),
+        estimated_speed_rad_s=per_joint("estimated_speed_rad_s"),
+        estimated_disturbance=per_joint("estimated_disturbance"),
+        filtered_disturbance=per_joint("filtered_disturbance"),
+        torque_nm=per_joint("torque_applied_nm"),
+        flags=columns["flags"].astype(np.int64),
+    )
+
+
+def summarise(
+    run: Run, experiment: TrackingExperiment, artifact: Artifact, *, plant: PlantKind, sensors: Sensors
+) -> TrackResult:
+    """The numbers of a run, however it was made."""
+
+    def tool_position(angle: FloatArray) -> FloatArray:
+        return np.array([experiment.robot.model.forward_kinematics(row)[:2] for row in angle])
+
+    runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()), artifact.name)
+    return TrackResult(
+        scenario=experiment.name,
+        variant=Variant(
+            artifact.law.kind, sensors.encoder_bits, getattr(artifact.law, "disturbance_compensation", True)
+        ),
+        rate_hz=round(1.0 / artifact.sample_period_s, 6),
+        plant=plant,
+        velocity_noise_rad_s=sensors.velocity_noise_rad_s,
+        metrics=compute_metrics(run, tool_position),
+        worst_growth_rate_per_s=worst_growth_rate(artifact),
+        run=run,
+        tool_position_m=tool_position(run.true_angle_rad),
+        reference_position_m=tool_position(run.reference_angle_rad),
+        true_disturbance=true_disturbance(run, artifact, runtime),
+    )
+
+
+def worst_growth_rate(artifact: Artifact) -> float | None:
+    """Worst growth rate (1/s, half a sample of delay included) in the design's report; ``None`` if it has no report."""
+    report = (artifact.verification or {}).get("report", {})
+    rate = report.get("worst_growth_rate_per_s") if isinstance(report, dict) else None
+    return None if rate is None else float(rate)

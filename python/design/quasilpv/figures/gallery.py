@@ -1,0 +1,46 @@
+"""All figures of a run, and of a scenario, as files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from quasilpv.experiments.result import TrackResult
+from quasilpv.figures.comparison import comparison_figure
+from quasilpv.figures.style import save
+from quasilpv.figures.tracking import (
+    disturbance_figure,
+    error_figure,
+    path_figure,
+    torque_figure,
+    velocity_figure,
+)
+
+
+def write_gallery(result: TrackResult, folder: Path) -> list[Path]:
+    """Write path, errors, torques, speed error and, if the law estimates one, the disturbance of a run.
+
+    Returns:
+        The files, PNG and SVG of each.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    figures = {
+        "path": path_figure,
+        "errors": error_figure,
+        "torques": torque_figure,
+        "velocity": velocity_figure,
+    }
+    if result.true_disturbance is not None:
+        figures["disturbance"] = disturbance_figure
+    return [file for name, draw in figures.items() for file in save(draw(result), folder / name)]
+
+
+def write_comparison(results: Sequence[TrackResult], folder: Path) -> list[Path]:
+    """Write the comparison of all runs of one scenario.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    return save(comparison_figure(results), folder / "comparison")

@@ -1,0 +1,132 @@
+"""The one style of all figures, and how they are written.
+
+Colours are those of Okabe and Ito (2008), distinguishable with any common colour blindness. No global matplotlib state
+is touched: figures are built from `Figure` with the Agg canvas, which also makes them usable without a display.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from quasilpv.errors import InputError
+
+BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
+    "#000000",
+    "#E69F00",
+    "#56B4E9",
+    "#009E73",
+    "#0072B2",
+    "#D55E00",
+    "#CC79A7",
+)
+JOINT_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+CONTROLLER_COLOURS = {
+    "pid": PURPLE,
+    "ctc": ORANGE,
+    "ctc-dob": SKY,
+    "dob-torque": GREEN,
+    "dob-acceleration": BLUE,
+}
+REFERENCE_COLOUR = BLACK
+
+WIDTH_IN = 7.0
+PIXELS_PER_INCH = 200
+
+_PARAMETERS: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.useoffset": False,
+    "grid.color": "#d9d9d9",
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.1,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "quasilpv",
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """The style as a context: figures must be built and saved inside it (matplotlib resolves some defaults late)."""
+    with mpl.rc_context(_PARAMETERS):
+        yield
+
+
+def new_figure(height_in: float, title: str) -> Figure:
+    """An empty figure of the common width with a title, laid out so that no text overlaps."""
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=10.5, x=0.01, ha="left")
+    return figure
+
+
+def legend_above(axes: Axes, columns: int = 4) -> None:
+    """The legend of ``axes``, above the plot on its right, where it covers no data."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, handlelength=2.2)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit that keeps the numbers on an axis readable: ``shown = si_value * factor``."""
+
+    name: str
+    factor: float
+
+
+def length_unit(largest_m: float) -> Unit:
+    """Millimetres, or micrometres where the largest value is below a fifth of a millimetre."""
+    return Unit("µm", 1e6) if largest_m < 2e-4 else Unit("mm", 1e3)
+
+
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Write ``stem.png`` and ``stem.svg``, each complete or not at all.
+
+    Args:
+        figure: a figure of this package.
+        stem: path without suffix; missing folders are made.
+
+    Returns:
+        The two paths.
+
+    Raises:
+        InputError: the folder or a file cannot be written.
+    """
+    written = []
+    try:
+        stem.parent.mkdir(parents=True, exist_ok=True)
+        for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None})):
+            target = stem.with_name(stem.name + suffix)
+            handle, temporary = tempfile.mkstemp(dir=stem.parent, prefix=f".{stem.name}", suffix=suffix)
+            os.close(handle)
+            try:
+                with style():
+                    figure.savefig(temporary, dpi=PIXELS_PER_INCH, metadata=metadata)
+                Path(temporary).replace(target)
+            finally:
+                Path(temporary).unlink(missing_ok=True)
+            written.append(target)
+    except OSError as error:
+        raise InputError(str(stem.parent), "folder", error.strerror or error, "a writable folder") from error
+    return written

@@ -1,0 +1,142 @@
+"""Figures of one closed-loop run: path, tool error, torques, disturbance and its estimate, speed estimate."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from quasilpv.experiments.result import TrackResult
+from quasilpv.experiments.run import FloatArray
+from quasilpv.figures.style import (
+    BLACK,
+    BLUE,
+    JOINT_COLOURS,
+    REFERENCE_COLOUR,
+    VERMILION,
+    legend_above,
+    length_unit,
+    new_figure,
+    style,
+)
+
+
+def path_figure(result: TrackResult) -> Figure:
+    """The tool's path in the plane over its reference, and the same path with the error exaggerated.
+
+    The right panel draws reference + factor * (actual - reference): the factor, a round number printed in the legend,
+    makes the largest deviation about a tenth of the path's extent, so that micrometres are seen where they happen.
+    """
+    reference, actual = result.reference_position_m, result.tool_position_m
+    error = actual - reference
+    factor = _exaggeration(error, reference)
+    with style():
+        figure = new_figure(3.9, f"{result.title}: path of the tool")
+        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+        for axes in (left, right):
+            axes.plot(*reference.T, color=REFERENCE_COLOUR, linestyle=(0, (4, 2)), label="reference")
+            axes.plot(*reference[0], marker="o", color=REFERENCE_COLOUR, markersize=4)
+            axes.set_aspect("equal", adjustable="box")
+            axes.set_xlabel("X (m)")
+        left.plot(*actual.T, color=BLUE, label="tool")
+        right.plot(*(reference + factor * error).T, color=VERMILION, label=f"tool, error × {factor:g}")
+        left.set_ylabel("Y (m)")
+        for axes in (left, right):
+            legend_above(axes)
+        return figure
+
+
+def error_figure(result: TrackResult) -> Figure:
+    """Position error of the tool along X and Y over time, with its rms and maximum."""
+    error = result.tool_position_m - result.reference_position_m
+    unit = length_unit(float(np.max(np.abs(error))))
+    with style():
+        figure = new_figure(3.8, f"{result.title}: position error of the tool")
+        for column, (axes, name) in enumerate(zip(figure.subplots(2, 1, sharex=True), "XY", strict=True)):
+            shown = error[:, column] * unit.factor
+            rms, peak = np.sqrt(np.mean(shown**2)), np.max(np.abs(shown))
+            axes.axhspan(-rms, rms, color="#e8eef4", linewidth=0.0)
+            axes.plot(result.run.time_s, shown, color=BLUE, linewidth=0.8)
+            axes.set_ylabel(f"{name} error ({unit.name})")
+            axes.set_title(f"rms {rms:.3g} {unit.name} (shaded), largest {peak:.3g} {unit.name}")
+        _label_time(axes, result)
+        return figure
+
+
+def torque_figure(result: TrackResult) -> Figure:
+    """Applied torque of every joint over time, and its increments from sample to sample."""
+    torque, time_s = result.run.torque_nm, result.run.time_s
+    with style():
+        figure = new_figure(4.4, f"{result.title}: applied torque")
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        _plot_joints(upper, time_s, torque)
+        _plot_joints(lower, time_s[1:], np.diff(torque, axis=0), linewidth=0.5)
+        upper.set_ylabel("torque (N m)")
+        lower.set_ylabel("increment (N m)")
+        lower.set_title(f"per sample, rms over the joints {result.metrics.rms_torque_increment_nm:.3g} N m")
+        legend_above(upper)
+        _label_time(lower, result)
+        return figure
+
+
+def disturbance_figure(result: TrackResult) -> Figure:
+    """The true lumped disturbance and its estimate, joint by joint, in the units of the controller's law.
+
+    Raises:
+        ValueError: the law of the run estimates no disturbance.
+    """
+    disturbance = result.true_disturbance
+    if disturbance is None:
+        raise ValueError(f"{result.variant.controller} estimates no disturbance")
+    with style():
+        figure = new_figure(
+            1.5 * result.run.joints + 0.6, f"{result.title}: disturbance as {disturbance.quantity}, and its estimate"
+        )
+        for joint, axes in enumerate(figure.subplots(result.run.joints, 1, sharex=True, squeeze=False)[:, 0]):
+            axes.plot(result.run.time_s, disturbance.values[:, joint], color=BLACK, linewidth=1.8, label="true")
+            estimate = result.run.filtered_disturbance[:, joint]
+            axes.plot(result.run.time_s, estimate, color=VERMILION, linestyle=(0, (3, 1.5)), label="estimate")
+            axes.set_ylabel(f"joint {joint + 1} ({disturbance.unit})")
+            if joint == 0:
+                legend_above(axes)
+        figure.align_ylabels()
+        _label_time(axes, result)
+        return figure
+
+
+def velocity_figure(result: TrackResult) -> Figure:
+    """Error of the estimated (or filtered) joint speeds over time."""
+    error = result.run.estimated_speed_rad_s - result.run.true_speed_rad_s
+    with style():
+        figure = new_figure(1.4 * result.run.joints + 0.6, f"{result.title}: error of the estimated joint speed")
+        for joint, axes in enumerate(figure.subplots(result.run.joints, 1, sharex=True, squeeze=False)[:, 0]):
+            axes.plot(result.run.time_s, error[:, joint], color=JOINT_COLOURS[joint], linewidth=0.7)
+            axes.set_ylabel(f"joint {joint + 1} (rad/s)")
+            axes.set_title(f"rms {np.sqrt(np.mean(error[:, joint] ** 2)):.2g} rad/s")
+        figure.align_ylabels()
+        _label_time(axes, result)
+        return figure
+
+
+def _plot_joints(axes: Axes, time_s: FloatArray, values: FloatArray, linewidth: float = 0.9) -> None:
+    for joint in range(values.shape[1]):
+        colour = JOINT_COLOURS[joint]
+        axes.plot(time_s, values[:, joint], color=colour, linewidth=linewidth, label=f"joint {joint + 1}")
+
+
+def _label_time(axes: Axes, result: TrackResult) -> None:
+    axes.set_xlabel("time (s)")
+    axes.set_xlim(0.0, float(result.run.time_s[-1]))
+
+
+def _exaggeration(error: FloatArray, reference: FloatArray) -> float:
+    """The round factor (1, 2 or 5 times a power of ten) that makes the largest error about a tenth of the extent."""
+    largest = float(np.max(np.hypot(*error.T)))
+    extent = float(np.max(np.ptp(reference, axis=0)))
+    if largest == 0.0 or 0.1 * extent <= largest:
+        return 1.0
+    exponent = math.floor(math.log10(0.1 * extent / largest))
+    scale = 10.0**exponent
+    return max(step for step in (1.0, 2.0, 5.0) if step * scale <= 0.1 * extent / largest * (1 + 1e-12)) * scale
