@@ -74,7 +74,12 @@ int exit_code(const ControlLoop& loop, const ControllerRunReport& run, const Com
                          " within " + std::to_string(options.timeout_s) + " s: is qlpv-simulator running?");
   }
   const bool ended_in_fault = loop.state() == ControllerState::kFault && loop.cause() != FaultCause::kStopRequested;
-  return ended_in_fault || run.end == ControllerRunEnd::kPlantSilent ? kExitFaultStop : kExitDone;
+  if (!ended_in_fault && run.end != ControllerRunEnd::kPlantSilent) {
+    return kExitDone;
+  }
+  const char* reason = ended_in_fault ? to_string(loop.cause()) : to_string(run.end);
+  std::cerr << "qlpv-controller: fault stop: " << reason << ", last sample " << loop.last_seq() << '\n';
+  return kExitFaultStop;
 }
 
 int run(const CLI::App& app, Options& options) {

@@ -88,20 +88,31 @@ class RecordFile {
   Record record_;
 };
 
-int exit_code(const PlantRunReport& run, const CommonOptions& options) {
-  switch (run.end) {
-    case PlantRunEnd::kControllerNeverHeard:
-      throw TransportError("no command of session " + std::to_string(options.session) + " on " + options.url +
-                           " within " + std::to_string(options.timeout_s) + " s: is qlpv-controller running?");
-    case PlantRunEnd::kControllerSilent:
-    case PlantRunEnd::kControllerEnded:
-      return kExitFaultStop;
-    case PlantRunEnd::kStopped:
-      return kExitDone;
-    case PlantRunEnd::kCompleted:
-      break;
+/// Why the run counts as stopped by a fault, null if it does not.
+const char* fault_stop_reason(const PlantRunReport& run) {
+  if (run.end == PlantRunEnd::kControllerSilent || run.end == PlantRunEnd::kControllerEnded) {
+    return to_string(run.end);
   }
-  return run.watchdog_at_end || run.controller_state == ControllerState::kFault ? kExitFaultStop : kExitDone;
+  if (run.end != PlantRunEnd::kCompleted) {
+    return nullptr;
+  }
+  if (run.watchdog_at_end) {
+    return "controller silent, braked by the watchdog";
+  }
+  return run.controller_state == ControllerState::kFault ? "controller in fault" : nullptr;
+}
+
+int exit_code(const PlantRunReport& run, const CommonOptions& options) {
+  if (run.end == PlantRunEnd::kControllerNeverHeard) {
+    throw TransportError("no command of session " + std::to_string(options.session) + " on " + options.url +
+                         " within " + std::to_string(options.timeout_s) + " s: is qlpv-controller running?");
+  }
+  const char* reason = fault_stop_reason(run);
+  if (reason == nullptr) {
+    return kExitDone;
+  }
+  std::cerr << "qlpv-simulator: fault stop: " << reason << ", last sample " << run.samples << '\n';
+  return kExitFaultStop;
 }
 
 int run(const CLI::App& app, Options& options) {

@@ -78,7 +78,7 @@ class PlantRun {
     if (lock_step_sample() && settings_.pace == Pace::kRealTime) {
       run_real_time();
     } else {
-      while (!end_ && !is_complete() && lock_step_sample()) {
+      while (!end_ && !is_complete() && !must_end() && lock_step_sample()) {
       }
     }
     report_.samples = session_.seq();
