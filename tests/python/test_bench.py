@@ -1,0 +1,84 @@
+"""The benchmark tools: shape of their rows and their errors. How fast anything is, is never asserted."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TOOLS = ROOT / "tools" / "bench"
+LAYERS = ("step", "plant", "lmi", "transport")
+
+
+def run_tool(layer: str, *options: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    command = [str(TOOLS / layer), "--quick", *options]
+    return subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, check=False)
+
+
+@cache
+def quick_rows(layer: str) -> list[dict[str, Any]]:
+    done = run_tool(layer, "--json")
+    assert done.returncode == 0, done.stderr
+    rows: list[dict[str, Any]] = json.loads(done.stdout)
+    return rows
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_every_row_is_a_positive_duration_with_a_name_of_its_own(layer: str) -> None:
+    rows = quick_rows(layer)
+    assert rows
+    assert len({row["name"] for row in rows}) == len(rows)
+    for row in rows:
+        assert set(row) == {"name", "value", "unit", "against", "ratio"}
+        assert row["unit"] in {"ns", "us", "ms", "s"}
+        assert math.isfinite(row["value"])
+        assert row["value"] > 0
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_a_ratio_is_given_exactly_where_there_is_a_competitor(layer: str) -> None:
+    for row in quick_rows(layer):
+        assert (row["against"] is None) == (row["ratio"] is None)
+        assert row["ratio"] is None or row["ratio"] > 0
+
+
+@pytest.mark.parametrize("layer", ["plant", "transport"])
+def test_when_the_competitor_is_a_row_too_expect_ratio_competitor_over_ours(layer: str) -> None:
+    values = {row["name"]: row["value"] for row in quick_rows(layer)}
+    beside = [row for row in quick_rows(layer) if row["against"] in values]
+    assert beside
+    for row in beside:
+        assert row["ratio"] == pytest.approx(values[row["against"]] / row["value"], rel=1e-12)
+
+
+def test_the_step_benchmark_has_the_median_step_of_every_law() -> None:
+    names = {row["name"] for row in quick_rows("step")}
+    assert {f"{law} step p50" for law in ("dob-acceleration", "pid", "ctc", "ctc-dob")} <= names
+
+
+def test_quantiles_of_the_step_are_ordered() -> None:
+    values = {row["name"]: row["value"] for row in quick_rows("step")}
+    p50, p99, p999 = (values[f"dob-acceleration step {quantile}"] for quantile in ("p50", "p99", "p99.9"))
+    assert p50 <= p99 <= p999
+
+
+@pytest.mark.parametrize("layer", ["step", "plant", "transport"])
+def test_when_the_programs_are_not_built_expect_exit_2_and_one_line_that_names_the_folder(
+    layer: str, tmp_path: Path
+) -> None:
+    done = run_tool(layer, QUASILPV_BIN=str(tmp_path))
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1
+    assert str(tmp_path) in done.stderr
+
+
+def test_when_a_tool_is_given_an_unknown_option_expect_exit_2() -> None:
+    assert run_tool("lmi", "--fast").returncode == 2

@@ -1,0 +1,104 @@
+"""The compiled benchmark programs, and the experiment they are given: the perturbed 3-DoF arm draws the square."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from bench_report import ROOT
+
+from quasilpv.artifact import write_artifact
+from quasilpv.errors import InputError, QuasilpvError
+from quasilpv.experiments.designs import kept_design
+from quasilpv.scenarios import build_scenario, write_scenario
+from quasilpv.synthesis import Specification
+from quasilpv.systems.registry import robot
+from quasilpv.trajectories import serial_square
+from quasilpv.trajectories.document import write_trajectory
+
+ROBOT = "arm3"
+ACCELERATION_RAD_S2 = (-20.0, 20.0)
+DEFAULT_FOLDER = ROOT / "build" / "release" / "tools" / "bench"
+
+
+class ProgramError(QuasilpvError):
+    """A benchmark program failed; the message is its own."""
+
+
+def run_program(name: str, *arguments: Path | str | int) -> Any:
+    """Run a compiled benchmark program of ``$QUASILPV_BIN`` or ``build/release/tools/bench``.
+
+    Returns:
+        The JSON document it prints.
+
+    Raises:
+        InputError: it has not been built.
+        ProgramError: it failed.
+    """
+    program = Path(os.environ.get("QUASILPV_BIN", DEFAULT_FOLDER)) / name
+    if not program.is_file():
+        expected = "a program: run tools/lib/build.sh --with-tests, or set QUASILPV_BIN to the folder that holds it"
+        raise InputError("tools/bench", name, f"nothing at {program}", expected)
+    return run_path(program, *arguments)
+
+
+def run_path(program: Path, *arguments: Path | str | int) -> Any:
+    """Run a program that prints one JSON document. Errors as `run_program`."""
+    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        message = " ".join(done.stderr.split()) or f"exit code {done.returncode}"
+        raise ProgramError(f"{program.name}: {message}")
+    return json.loads(done.stdout)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Files of one experiment, in a folder of their own.
+
+    Attributes:
+        folder: where everything is written.
+        trajectory: the square in joint space.
+        scenario: the perturbed plant under the external torque, with the default sensors.
+    """
+
+    folder: Path
+    trajectory: Path
+    scenario: Path
+
+    @classmethod
+    def write(cls, folder: Path) -> Experiment:
+        """Write trajectory and scenario of the arm into a folder."""
+        arm = robot(ROBOT)
+        square = serial_square(arm.model, arm.domain)
+        return cls(
+            folder,
+            write_trajectory(folder / "trajectory.json", square),
+            write_scenario(folder / "scenario.json", build_scenario(arm, square)),
+        )
+
+    def artifact(self, controller: str) -> Path:
+        """Write the artifact of a controller at its default specification; a design made before is reused."""
+        design = kept_design(ROBOT, controller, Specification(), folder=ROOT / "out" / "cache")
+        return write_artifact(self.folder / controller, design)[0]
+
+    def states(self, count: int) -> Path:
+        """Write random motions within the arm's domain: what inverse dynamics is evaluated at."""
+        domain = robot(ROBOT).domain
+        random = np.random.default_rng(0)
+        boxes = {
+            "angle": domain.angle_rad,
+            "speed": domain.speed_rad_s,
+            "acceleration": (ACCELERATION_RAD_S2,) * domain.joints,
+        }
+        rows = [
+            {name: [random.uniform(low, high) for low, high in box] for name, box in boxes.items()}
+            for _ in range(count)
+        ]
+        path = self.folder / "states.json"
+        path.write_text(json.dumps(rows), encoding="utf-8")
+        return path

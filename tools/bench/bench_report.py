@@ -1,0 +1,179 @@
+"""What every benchmark tool prints and keeps: rows with a competitor of the same run, on which machine, with what."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal
+
+from rich.console import Console
+from rich.table import Table
+
+from quasilpv.artifact.files import write_atomically
+from quasilpv.errors import QuasilpvError
+
+ROOT = Path(__file__).resolve().parents[2]
+KEPT = ROOT / "out" / "bench"
+HEADER = "ratio = competitor / ours: above 1 ours is the faster"
+
+Unit = Literal["ns", "us", "ms", "s"]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured duration.
+
+    Attributes:
+        name: what was measured.
+        value: how long it took, in `unit`.
+        unit: ns, us, ms or s.
+        against: the competitor measured in the same run, None if there is none.
+        ratio: duration of the competitor over `value`, None if there is no competitor.
+    """
+
+    name: str
+    value: float
+    unit: Unit
+    against: str | None = None
+    ratio: float | None = None
+
+
+def row(name: str, value: float, unit: Unit, against: tuple[str, float] | None = None) -> Row:
+    """The row of a duration beside that of a competitor, (its name, its duration in the same unit)."""
+    return Row(name, value, unit) if against is None else Row(name, value, unit, against[0], against[1] / value)
+
+
+@dataclass(frozen=True)
+class Report:
+    """Outcome of one benchmark tool.
+
+    Attributes:
+        rows: the durations.
+        notes: what a reader must know to judge them: errors of what was timed, how, what could not be measured and why.
+        packages: Python distributions whose version matters.
+    """
+
+    rows: list[Row]
+    notes: list[str] = field(default_factory=list)
+    packages: Sequence[str] = ()
+
+
+def run_tool(layer: str, summary: str, measure: Callable[[bool], Report]) -> int:
+    """Parse the command line of a benchmark tool, measure, print, and keep the result in ``out/bench/<layer>.json``.
+
+    Args:
+        layer: name of the tool.
+        summary: one line for ``--help``.
+        measure: called with ``quick``; a quick run says that the tool works, its numbers are not kept.
+
+    Returns:
+        Exit code: 0; 1 if what is compared is not the same computation; 2 for bad input.
+    """
+    parser = argparse.ArgumentParser(
+        prog=f"tools/bench/{layer}", description=summary, epilog=f"{HEADER}. Kept in out/bench/{layer}.json."
+    )
+    parser.add_argument("--json", action="store_true", help="print a list of {name, value, unit, against, ratio}")
+    parser.add_argument("--quick", action="store_true", help="few repetitions, nothing is kept: a check of the tool")
+    options = parser.parse_args()
+    try:
+        report = measure(options.quick)
+        if not options.quick:
+            keep(layer, report)
+    except DisagreementError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except QuasilpvError as error:
+        print(error, file=sys.stderr)
+        return 2
+    present(layer, report, as_json=options.json)
+    return 0
+
+
+class DisagreementError(QuasilpvError):
+    """Two implementations that are compared do not compute the same (exit code 1)."""
+
+
+def present(layer: str, report: Report, *, as_json: bool) -> None:
+    """Print the rows on stdout, the notes on stderr."""
+    if as_json:
+        print(json.dumps([asdict(entry) for entry in report.rows], indent=2, allow_nan=False))
+    else:
+        print_table(layer, report.rows)
+    for note in report.notes:
+        print(note, file=sys.stderr)
+
+
+def print_table(layer: str, rows: Sequence[Row]) -> None:
+    """Print rows on stdout, never narrower than their content when stdout is not a terminal."""
+    table = Table(title=f"{layer}: {HEADER}", title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("", "value", "unit", "ratio", "competitor"):
+        table.add_column(heading, justify="right" if heading in {"value", "ratio"} else "left", no_wrap=True)
+    for r in rows:
+        table.add_row(r.name, f"{r.value:.4g}", r.unit, "" if r.ratio is None else f"{r.ratio:.3g}", r.against)
+    Console(width=None if sys.stdout.isatty() else 160).print(table)
+
+
+def keep(layer: str, report: Report) -> None:
+    """Write rows, notes and the circumstances of the measurement to ``out/bench/<layer>.json``."""
+    document = {"layer": layer, **circumstances(report.packages), **asdict(report)}
+    del document["packages"]
+    KEPT.mkdir(parents=True, exist_ok=True)
+    write_atomically({KEPT / f"{layer}.json": (json.dumps(document, indent=2) + "\n").encode()})
+
+
+def circumstances(packages: Sequence[str]) -> dict[str, Any]:
+    """Machine, date and versions. The load says how much else ran: above the number of cores, medians suffer too."""
+    return {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": platform.node(),
+        "cpu": cpu_model(),
+        "cores": os.cpu_count(),
+        "load_average": os.getloadavg()[0],
+        "kernel": f"{platform.system()} {platform.release()}",
+        "versions": {
+            "python": platform.python_version(),
+            "compiler": compiler(),
+            **{name: metadata.version(name) for name in ("quasilpv", *packages) if is_installed(name)},
+        },
+    }
+
+
+def cpu_model() -> str:
+    """The processor's name as Linux reports it; what Python knows elsewhere."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def compiler() -> str:
+    """First line of what the C++ compiler says of itself."""
+    try:
+        output = subprocess.run(["c++", "--version"], capture_output=True, text=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return output.splitlines()[0]
+
+
+def is_installed(distribution: str) -> bool:
+    """Whether a Python distribution is installed."""
+    try:
+        metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return False
+    return True
+
+
+def main(layer: str, summary: str, measure: Callable[[bool], Report]) -> None:
+    """`run_tool` as a program."""
+    sys.exit(run_tool(layer, summary, measure))
