@@ -24,7 +24,7 @@ void expect_object(const Field& field) {
 }
 
 std::string hex_digits(const Field& field, std::size_t count) {
-  const std::string text = field.text();
+  std::string text = field.text();
   const bool is_hex = text.find_first_not_of("0123456789abcdef") == std::string::npos;
   if (text.size() != count || !is_hex) {
     field.fail(std::to_string(text.size()) + " characters", std::to_string(count) + " lower-case hexadecimal digits");

@@ -23,6 +23,23 @@ Eigen::MatrixXd parse_matrix(const Field& field, int rows, int columns) {
   return matrix;
 }
 
+// Premises of one block, marked in `seen`.
+std::vector<int> parse_block_premises(const Field& field, std::vector<bool>& seen) {
+  if (field.size() > kMaxBlockPremises || (field.size() == 0 && !seen.empty())) {
+    field.fail(std::to_string(field.size()) + " premises", "1 to " + std::to_string(kMaxBlockPremises));
+  }
+  std::vector<int> premises;
+  for (std::size_t k = 0; k < field.size(); ++k) {
+    const auto premise = static_cast<std::size_t>(field.at(k).integer(0, static_cast<std::int64_t>(seen.size()) - 1));
+    if (seen[premise]) {
+      field.at(k).fail("premise " + std::to_string(premise) + " again", "every premise in exactly one block");
+    }
+    seen[premise] = true;
+    premises.push_back(static_cast<int>(premise));
+  }
+  return premises;
+}
+
 }  // namespace
 
 BlockPolytope BlockPolytope::parse(const Field& field, int rows, int columns) {
@@ -44,13 +61,12 @@ void BlockPolytope::parse_box(const Field& field) {
   upper_ = field["upper"].numbers(premises);
   centre_ = field["centre"].numbers(premises);
   for (std::size_t p = 0; p < premises; ++p) {
-    const std::string low = canonical_number(lower_[p]);
-    const std::string high = canonical_number(upper_[p]);
     if (lower_[p] >= upper_[p]) {
-      field["upper"].at(p).fail(high, "more than the lower bound " + low);
+      field["upper"].at(p).fail(canonical_number(upper_[p]),
+                                "more than the lower bound " + canonical_number(lower_[p]));
     }
     if (centre_[p] < lower_[p] || centre_[p] > upper_[p]) {
-      field["centre"].at(p).fail(canonical_number(centre_[p]), "a point of the box [" + low + ", " + high + "]");
+      field["centre"].at(p).fail(canonical_number(centre_[p]), "a point of the box");
     }
   }
 }
@@ -58,32 +74,19 @@ void BlockPolytope::parse_box(const Field& field) {
 void BlockPolytope::parse_blocks(const Field& field, int rows, int columns) {
   std::vector<bool> seen(centre_.size(), false);
   for (std::size_t b = 0; b < field.size(); ++b) {
-    const Field block_field = field.at(b);
-    block_field.only({"kind", "premises", "vertices"});
-    block_field["kind"].expect_text("box");
-    const Field premises = block_field["premises"];
-    if (premises.size() > kMaxBlockPremises || (premises.size() == 0 && !centre_.empty())) {
-      premises.fail(std::to_string(premises.size()) + " premises", "1 to " + std::to_string(kMaxBlockPremises));
-    }
-    Block block{{}, vertices_.size()};
-    for (std::size_t k = 0; k < premises.size(); ++k) {
-      const auto premise =
-          static_cast<std::size_t>(premises.at(k).integer(0, static_cast<std::int64_t>(centre_.size()) - 1));
-      if (seen[premise]) {
-        premises.at(k).fail("premise " + std::to_string(premise) + " again", "every premise in exactly one block");
-      }
-      seen[premise] = true;
-      block.premises.push_back(static_cast<int>(premise));
-    }
-    const Field vertices = block_field["vertices"];
-    const std::size_t corners = std::size_t{1} << block.premises.size();
+    const Field block = field.at(b);
+    block.only({"kind", "premises", "vertices"});
+    block["kind"].expect_text("box");
+    blocks_.push_back({parse_block_premises(block["premises"], seen), vertices_.size()});
+
+    const Field vertices = block["vertices"];
+    const std::size_t corners = std::size_t{1} << blocks_.back().premises.size();
     if (vertices.size() != corners) {
       vertices.fail(std::to_string(vertices.size()) + " vertices", std::to_string(corners));
     }
     for (std::size_t c = 0; c < corners; ++c) {
       vertices_.push_back(parse_matrix(vertices.at(c), rows, columns));
     }
-    blocks_.push_back(std::move(block));
   }
   const auto missing = std::find(seen.begin(), seen.end(), false);
   if (missing != seen.end()) {

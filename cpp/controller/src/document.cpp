@@ -1,6 +1,7 @@
 // Strict reading of documents: one SAX reader for both twins, then the comparison with the canonical bytes.
 #include "quasilpv/document.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -125,11 +126,7 @@ Json read(std::string_view bytes, Format format, const std::string& source) {
 
 // Offset of the first byte in which the two differ.
 std::size_t first_difference(std::string_view a, std::string_view b) {
-  std::size_t offset = 0;
-  while (offset < a.size() && offset < b.size() && a[offset] == b[offset]) {
-    ++offset;
-  }
-  return offset;
+  return static_cast<std::size_t>(std::mismatch(a.begin(), a.end(), b.begin(), b.end()).first - a.begin());
 }
 
 }  // namespace
