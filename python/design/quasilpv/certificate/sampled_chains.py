@@ -4,8 +4,9 @@ The gains are the doubles of the artifact, taken as the rationals they are; the 
 the time unit ``1/w`` of each chain (w: the bandwidth in the witness), with ``t = w T``:
 
 * feedback ``K = (kp / w^2, kd / w, ki / w^3)``, chain ``A = [[1, t, 0], [0, 1, 0], [t, 0, 1]]``,
-  ``B = [t^2/2, t, 0]'``; claims: with F = A + B K, ``[[r P, (F - c I) P], [*, r P]] > 0`` (poles in the disk ``|z - c| < r``) and
-  ``[[P, F P, B], [*, P, 0], [*, *, 1]] > 0`` (P bounds the stationary covariance under unit white acceleration).
+  ``B = [t^2/2, t, 0]'``; claims: with F = A + B K, ``[[r P, (F - c I) P], [*, r P]] > 0`` (poles in the disk
+  ``|z - c| < r``) and ``[[P, F P, B], [*, P, 0], [*, *, 1]] > 0`` (P bounds the stationary covariance under unit white
+  acceleration).
 * observer ``l = (l1, l2 / w, l3 / w^2, l4 / w^3)'``, chain ``A = exp(N t)``, N the nilpotent shift; claims: with
   ``F = A (I - l C)``, ``[[r Q, Q (F - c I)], [*, r Q]] > 0``, ``[[Q, Q F], [*, Q - c3' c3]] > 0``, and
   ``objective > trace(H' Q H)`` with ``H = [A l, G]``: the variance of the disturbance estimate.

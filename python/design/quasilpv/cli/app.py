@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import typer
 
 from quasilpv import __version__
-from quasilpv.cli import hil, inspect, listing, synth, track
+from quasilpv.cli import hil, inspect, listing, synth, track, verify
 from quasilpv.errors import (
     ClaimError,
     FaultStop,
@@ -76,6 +76,7 @@ def _root(
 app.command("list")(listing.list_command)
 app.command("synth")(synth.synth_command)
 app.command("inspect")(inspect.inspect_command)
+app.command("verify")(verify.verify_command)
 app.command("track")(track.track_command)
 app.command("hil")(hil.hil_command)
 
