@@ -134,9 +134,7 @@ class Plant:
     def joints(self) -> int: ...
     @property
     def size(self) -> int: ...
-    def residual(
-        self, time_s: float, state: npt.ArrayLike, derivative: npt.ArrayLike, torque: npt.ArrayLike
-    ) -> _Array:
+    def residual(self, time_s: float, state: npt.ArrayLike, derivative: npt.ArrayLike, torque: npt.ArrayLike) -> _Array:
         """F(t, y, y') under a control torque (N m), shape (size,)."""
 
     def derivative(self, time_s: float, state: npt.ArrayLike, torque: npt.ArrayLike) -> _Array:

@@ -19,7 +19,7 @@ from quasilpv.cli.options import (
     require_controller,
     sensors_of,
 )
-from quasilpv.cli.results import print_results
+from quasilpv.cli.results import COLUMNS, cells
 from quasilpv.experiments.hil import HilResult, Mode, require_identical, run_over_lcm
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
@@ -27,6 +27,7 @@ from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
 LATENCIES = ("wakeup_ns", "round_trip_ns")
+COUNTERS = ("missed_commands", "late_commands", "watchdog_samples", "overruns", "skipped_ticks")
 QUANTILES = ("p50", "p99", "p99_9", "max")
 
 
@@ -92,14 +93,16 @@ def _row(over_lcm: HilResult, in_process: TrackResult) -> dict[str, Any]:
 
 
 def _print(over_lcm: HilResult, in_process: TrackResult) -> None:
-    print_results([in_process])
-    print_results([over_lcm.result])
+    title = f"{in_process.title}, {in_process.plant} plant, {in_process.rate_hz:g} Hz"
+    columns = ("", *COLUMNS[1:])
+    print_table(title, columns, [cells(in_process, "in process"), cells(over_lcm.result, f"over LCM, {over_lcm.mode}")])
+    latencies = {name: over_lcm.simulator[name] for name in LATENCIES if over_lcm.simulator[name] is not None}
     rows = [
-        (name.removesuffix("_ns").replace("_", " "), *(f"{over_lcm.simulator[name][q] / 1e3:.1f}" for q in QUANTILES))
-        for name in LATENCIES
+        (name.removesuffix("_ns").replace("_", " "), *(f"{latency[q] / 1e3:.1f}" for q in QUANTILES))
+        for name, latency in latencies.items()
     ]
-    print_table(f"over LCM, {over_lcm.mode}, latency in us", ("", *QUANTILES), rows)
-    counters = ("missed_commands", "late_commands", "watchdog_samples", "overruns")
-    print(", ".join(f"{name.replace('_', ' ')} {over_lcm.simulator[name]}" for name in counters))
+    print_table("latency at the plant, us", ("", *QUANTILES), rows)
     if over_lcm.mode == "lockstep":
         print(f"{over_lcm.result.run.time_s.size} samples, identical to the run in process")
+    else:
+        print(", ".join(f"{name.replace('_', ' ')}: {over_lcm.simulator[name]}" for name in COUNTERS))

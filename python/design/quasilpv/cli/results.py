@@ -26,14 +26,15 @@ def print_results(results: Sequence[TrackResult]) -> None:
         own = [result for result in results if result.scenario == scenario]
         rates = sorted({result.rate_hz for result in own})
         title = f"{scenario}, {own[0].plant} plant, {', '.join(f'{rate:g}' for rate in rates)} Hz"
-        print_table(title, COLUMNS, [_cells(result) for result in own])
+        print_table(title, COLUMNS, [cells(result, result.variant.label) for result in own])
 
 
-def _cells(result: TrackResult) -> list[str]:
+def cells(result: TrackResult, label: str) -> list[str]:
+    """One row of `COLUMNS` under a label of its own."""
     metrics, growth = result.metrics, result.worst_growth_rate_per_s
     lengths = (metrics.rms_x_m, metrics.rms_y_m, metrics.mav_x_m, metrics.mav_y_m)
     return [
-        result.variant.label,
+        label,
         *(f"{1e3 * length:.3g}" for length in lengths),
         f"{metrics.rms_torque_nm:.0f}",
         f"{metrics.rms_torque_increment_nm:.0f}",

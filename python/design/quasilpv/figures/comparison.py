@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from quasilpv.experiments.result import TrackResult
 from quasilpv.figures.style import BLACK, CONTROLLER_COLOURS, new_figure, style
 
-_FLOOR_MM = 1e-5
+_FLOOR_MM = 1e-3
 
 
 def comparison_figure(results: Sequence[TrackResult]) -> Figure:
@@ -43,6 +43,7 @@ def _plot_distance(axes: Axes, results: Sequence[TrackResult]) -> None:
             label=result.variant.label,
         )
     axes.set_ylabel("distance from the reference (mm)")
+    axes.set_ylim(bottom=_FLOOR_MM)
     axes.set_xlabel("time (s)")
     axes.set_xlim(0.0, max(float(result.run.time_s[-1]) for result in results))
 
@@ -51,12 +52,14 @@ def _plot_bars(axes: Axes, results: Sequence[TrackResult]) -> None:
     """Horizontal bars of the rms error (both axes together), annotated with the torque increment."""
     position = np.arange(len(results))[::-1]
     rms_mm = np.array([1e3 * np.hypot(result.metrics.rms_x_m, result.metrics.rms_y_m) for result in results])
-    axes.barh(position, rms_mm, height=0.62, color=[_colour(result) for result in results], log=True)
+    hatches = ["" if dashes == "-" else "///" for dashes in _dashes(results)]
+    colours = [_colour(result) for result in results]
+    axes.barh(position, rms_mm, height=0.62, color=colours, hatch=hatches, edgecolor="white", linewidth=0.0, log=True)
     for y, value, result in zip(position, rms_mm, results, strict=True):
         note = f" {value:.3g} mm, {result.metrics.rms_torque_increment_nm:.3g} N m per sample"
         axes.text(value, y, note, va="center", fontsize=8)
     axes.set_yticks(position, [result.variant.label for result in results])
-    axes.set_xlim(0.3 * float(rms_mm.min()), 60.0 * float(rms_mm.max()))
+    axes.set_xlim(0.3 * float(rms_mm.min()), 25.0 * float(rms_mm.max()))
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("rms distance from the reference (mm); rms torque increment beside it")
 

@@ -6,8 +6,7 @@ is touched: figures are built from `Figure` with the Agg canvas, which also make
 
 from __future__ import annotations
 
-import os
-import tempfile
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from quasilpv.errors import InputError
+from quasilpv.artifact.files import write_atomically
 
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
     "#000000",
@@ -38,7 +37,7 @@ CONTROLLER_COLOURS = {
     "dob-torque": GREEN,
     "dob-acceleration": BLUE,
 }
-REFERENCE_COLOUR = BLACK
+REFERENCE_COLOUR = "#8c8c8c"
 
 WIDTH_IN = 7.0
 PIXELS_PER_INCH = 200
@@ -113,20 +112,11 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     Raises:
         InputError: the folder or a file cannot be written.
     """
-    written = []
-    try:
-        stem.parent.mkdir(parents=True, exist_ok=True)
-        for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None})):
-            target = stem.with_name(stem.name + suffix)
-            handle, temporary = tempfile.mkstemp(dir=stem.parent, prefix=f".{stem.name}", suffix=suffix)
-            os.close(handle)
-            try:
-                with style():
-                    figure.savefig(temporary, dpi=PIXELS_PER_INCH, metadata=metadata)
-                Path(temporary).replace(target)
-            finally:
-                Path(temporary).unlink(missing_ok=True)
-            written.append(target)
-    except OSError as error:
-        raise InputError(str(stem.parent), "folder", error.strerror or error, "a writable folder") from error
-    return written
+    images: dict[Path, bytes] = {}
+    for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None})):
+        image = io.BytesIO()
+        with style():
+            figure.savefig(image, format=suffix[1:], dpi=PIXELS_PER_INCH, metadata=metadata)
+        images[stem.with_name(stem.name + suffix)] = image.getvalue()
+    write_atomically(images)
+    return list(images)

@@ -14,6 +14,7 @@ from quasilpv.figures.style import (
     BLACK,
     BLUE,
     JOINT_COLOURS,
+    ORANGE,
     REFERENCE_COLOUR,
     VERMILION,
     legend_above,
@@ -33,14 +34,14 @@ def path_figure(result: TrackResult) -> Figure:
     error = actual - reference
     factor = _exaggeration(error, reference)
     with style():
-        figure = new_figure(3.9, f"{result.title}: path of the tool")
+        figure = new_figure(4.0, f"{result.title}: path of the tool")
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes in (left, right):
-            axes.plot(*reference.T, color=REFERENCE_COLOUR, linestyle=(0, (4, 2)), label="reference")
+            axes.plot(*reference.T, color=REFERENCE_COLOUR, linewidth=2.2, label="reference")
             axes.plot(*reference[0], marker="o", color=REFERENCE_COLOUR, markersize=4)
             axes.set_aspect("equal", adjustable="box")
             axes.set_xlabel("X (m)")
-        left.plot(*actual.T, color=BLUE, label="tool")
+        left.plot(*actual.T, color=BLUE, linewidth=1.0, label="tool")
         right.plot(*(reference + factor * error).T, color=VERMILION, label=f"tool, error × {factor:g}")
         left.set_ylabel("Y (m)")
         for axes in (left, right):
@@ -92,12 +93,13 @@ def disturbance_figure(result: TrackResult) -> Figure:
         raise ValueError(f"{result.variant.controller} estimates no disturbance")
     with style():
         figure = new_figure(
-            1.5 * result.run.joints + 0.6, f"{result.title}: disturbance as {disturbance.quantity}, and its estimate"
+            1.7 * result.run.joints + 0.6, f"{result.title}: disturbance as {disturbance.quantity}, and its estimate"
         )
         for joint, axes in enumerate(figure.subplots(result.run.joints, 1, sharex=True, squeeze=False)[:, 0]):
-            axes.plot(result.run.time_s, disturbance.values[:, joint], color=BLACK, linewidth=1.8, label="true")
-            estimate = result.run.filtered_disturbance[:, joint]
-            axes.plot(result.run.time_s, estimate, color=VERMILION, linestyle=(0, (3, 1.5)), label="estimate")
+            true, estimate = disturbance.values[:, joint], result.run.filtered_disturbance[:, joint]
+            axes.plot(result.run.time_s, estimate, color=ORANGE, linewidth=1.8, label="estimate")
+            axes.plot(result.run.time_s, true, color=BLACK, linewidth=0.7, label="true")
+            axes.set_title(f"rms of the difference {np.sqrt(np.mean((estimate - true) ** 2)):.3g} {disturbance.unit}")
             axes.set_ylabel(f"joint {joint + 1} ({disturbance.unit})")
             if joint == 0:
                 legend_above(axes)
