@@ -105,13 +105,15 @@ TEST_P(TransportDelay, the_old_torque_acts_until_the_delay_has_passed) {
 
 INSTANTIATE_TEST_SUITE_P(UpToOneSample, TransportDelay, ::testing::Values(0.0, 2.5e-4, 5e-4, 1e-3));
 
-TEST(PlantSession, a_delay_too_short_to_integrate_over_counts_as_none) {
-  Scenario scenario = free_rotor();
-  scenario.integrator = IdaOptions{};
-  PlantSession session(scenario, kSamplePeriod);
-  session.advance(0, {2.0}, 1e-18);
-  session.advance(1, {2.0}, kSamplePeriod - 1e-18);
-  EXPECT_NEAR(session.truth().speed[0], 2.0 * 2.0 * kSamplePeriod, 1e-9);
+TEST(PlantSession, a_delay_within_nanoseconds_of_a_sample_boundary_does_not_trouble_ida) {
+  for (const double sliver : {1e-18, 5e-10, 2e-9, 1e-7}) {
+    Scenario scenario = free_rotor();
+    scenario.integrator = IdaOptions{};
+    PlantSession session(scenario, kSamplePeriod);
+    session.advance(0, {2.0}, sliver);
+    session.advance(1, {2.0}, kSamplePeriod - sliver);
+    EXPECT_NEAR(session.truth().speed[0], 2.0 * (2.0 * kSamplePeriod - sliver), 1e-8);
+  }
 }
 
 TEST(PlantSession, a_delay_given_with_the_command_replaces_that_of_the_scenario) {

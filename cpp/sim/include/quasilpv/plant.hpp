@@ -20,7 +20,7 @@ namespace quasilpv {
 /// never change it. All functions of t and y are RT-UNSAFE unless they say otherwise.
 class Plant {
  public:
-  using ConstVector = Eigen::Ref<const Eigen::VectorXd>;
+  using ConstVector = const Eigen::Ref<const Eigen::VectorXd>&;  // Eigen's idiom for a read-only argument
   using Vector = Eigen::Ref<Eigen::VectorXd>;
   using Matrix = Eigen::Ref<Eigen::MatrixXd>;
 
