@@ -89,6 +89,8 @@ def run(arguments: Sequence[str]) -> int:
     """
     try:
         code = app(args=list(arguments), prog_name="design", standalone_mode=False)
+        if code == EXIT_INTERRUPTED:  # typer has swallowed the KeyboardInterrupt
+            return _fail("interrupted", EXIT_INTERRUPTED)
         return code if isinstance(code, int) else 0
     except typer.TyperException as error:
         return _fail(f"command line: {error.format_message()} (design --help explains)", 2)

@@ -1,0 +1,176 @@
+"""Figures: every one drawn, readable, with units, and no text over another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from PIL import Image
+
+from quasilpv.errors import InputError
+from quasilpv.experiments.result import TrackResult, Variant
+from quasilpv.figures import (
+    comparison_figure,
+    disturbance_figure,
+    error_figure,
+    path_figure,
+    save,
+    torque_figure,
+    velocity_figure,
+)
+from quasilpv.figures.gallery import write_comparison, write_gallery
+from quasilpv.figures.style import CONTROLLER_COLOURS, JOINT_COLOURS, style
+from reference.runs import synthetic_result
+
+SINGLE = (path_figure, error_figure, torque_figure, disturbance_figure, velocity_figure)
+
+
+def default_result(joints: int = 3) -> TrackResult:
+    return synthetic_result(Variant("dob-acceleration"), joints)
+
+
+def all_results() -> list[TrackResult]:
+    variants = [Variant(name) for name in ("pid", "ctc", "ctc-dob", "dob-acceleration")]
+    return [synthetic_result(variant) for variant in (*variants, Variant("dob-acceleration", 17))]
+
+
+def hidden_tick_labels(figure: Figure) -> set[Text]:
+    """Labels of ticks outside the view, which matplotlib keeps but does not draw."""
+    hidden = set()
+    for axes in figure.axes:
+        for axis, (low, high) in ((axes.xaxis, sorted(axes.get_xlim())), (axes.yaxis, sorted(axes.get_ylim()))):
+            for minor in (False, True):
+                for location, label in zip(axis.get_ticklocs(minor=minor), axis.get_ticklabels(minor), strict=False):
+                    if not low <= location <= high:
+                        hidden.add(label)
+    return hidden
+
+
+def texts_with_boxes(figure: Figure) -> list[tuple[str, tuple[float, float, float, float]]]:
+    with style():
+        figure.canvas.draw()
+        hidden = hidden_tick_labels(figure)
+        boxes = []
+        for text in figure.findobj(Text):
+            assert isinstance(text, Text)
+            if text not in hidden and text.get_visible() and text.get_text().strip():
+                box = text.get_window_extent()
+                boxes.append((text.get_text(), (box.x0, box.y0, box.x1, box.y1)))
+    return boxes
+
+
+def assert_readable(figure: Figure) -> None:
+    boxes = texts_with_boxes(figure)
+    width, height = figure.canvas.get_width_height()
+    for text, (x0, y0, x1, y1) in boxes:
+        assert x0 >= -1 and y0 >= -1 and x1 <= width + 1 and y1 <= height + 1, f"{text!r} is cut"  # noqa: PT018
+    for (first, a), (second, b) in combinations(boxes, 2):
+        overlap = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+        assert min(overlap) <= 1.0, f"{first!r} overlaps {second!r}"
+
+
+@pytest.mark.parametrize("joints", [1, 3, 7])
+@pytest.mark.parametrize("draw", SINGLE)
+def test_when_a_figure_is_drawn_expect_no_text_cut_or_over_another(
+    draw: Callable[[TrackResult], Figure], joints: int
+) -> None:
+    assert_readable(draw(default_result(joints)))
+
+
+def test_when_controllers_are_compared_expect_no_text_cut_or_over_another() -> None:
+    assert_readable(comparison_figure(all_results()))
+
+
+@pytest.mark.parametrize("draw", SINGLE)
+def test_when_a_figure_is_drawn_expect_units_on_every_labelled_axis(draw: Callable[[TrackResult], Figure]) -> None:
+    for axes in draw(default_result()).axes:
+        for label in (axes.get_xlabel(), axes.get_ylabel()):
+            assert not label or label.endswith(")"), label
+    assert any(axes.get_xlabel() for axes in draw(default_result()).axes)
+
+
+def test_when_the_error_is_drawn_exaggerated_expect_the_factor_in_the_legend_to_be_the_one_drawn() -> None:
+    result = default_result()
+    right = path_figure(result).axes[1]
+    drawn = right.lines[-1]
+    label = str(drawn.get_label())
+    factor = float(label.rpartition("× ")[2])
+    error = result.tool_position_m - result.reference_position_m
+    expected = result.reference_position_m + factor * error
+    np.testing.assert_allclose(np.column_stack(drawn.get_data()), expected)  # type: ignore[arg-type]
+    largest = factor * np.hypot(*error.T).max()
+    assert 0.03 * np.ptp(expected, axis=0).max() < largest < 0.15 * np.ptp(expected, axis=0).max()
+
+
+def test_when_the_error_is_zero_expect_it_not_exaggerated() -> None:
+    result = default_result()
+    exact = replace(result, tool_position_m=result.reference_position_m)
+    assert "× 1" in str(path_figure(exact).axes[1].lines[-1].get_label())
+
+
+def test_when_a_law_estimates_no_disturbance_expect_no_figure_of_it(tmp_path: Path) -> None:
+    result = replace(synthetic_result(Variant("pid")), true_disturbance=None)
+    with pytest.raises(ValueError, match="estimates no disturbance"):
+        disturbance_figure(result)
+    assert not [file for file in write_gallery(result, tmp_path) if file.stem == "disturbance"]
+
+
+def test_when_a_gallery_is_written_expect_a_png_for_print_and_an_svg_of_each(tmp_path: Path) -> None:
+    files = [*write_gallery(default_result(), tmp_path), *write_comparison(all_results(), tmp_path)]
+    assert {file.name for file in files} == {
+        f"{name}{suffix}"
+        for name in ("path", "errors", "torques", "velocity", "disturbance", "comparison")
+        for suffix in (".png", ".svg")
+    }
+    for file in files:
+        if file.suffix == ".png":
+            with Image.open(file) as image:
+                assert image.width >= 1200
+                assert len(image.convert("L").getcolors(1 << 16) or []) > 2  # not blank
+        else:
+            assert "time (s)" in file.read_text(encoding="utf-8") or "X (m)" in file.read_text(encoding="utf-8")
+    assert set(tmp_path.iterdir()) == set(files)
+
+
+def test_when_the_same_figure_is_written_twice_expect_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        save(path_figure(default_result()), tmp_path / name / "path")
+    for suffix in (".png", ".svg"):
+        assert (tmp_path / "first" / f"path{suffix}").read_bytes() == (
+            tmp_path / "second" / f"path{suffix}"
+        ).read_bytes()
+
+
+def test_when_the_folder_cannot_be_written_expect_one_line(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.touch()
+    with pytest.raises(InputError, match="expected a writable"):
+        save(path_figure(default_result()), blocked / "path")
+
+
+def simulated(colour: str, matrix: list[list[float]]) -> np.ndarray:
+    """A colour as seen with a dichromacy (Viénot, Brettel and Mollon 1999), linear RGB."""
+    rgb = np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return np.asarray(np.array(matrix) @ linear)
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        [[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]],  # protanopia
+        [[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]],  # deuteranopia
+    ],
+)
+@pytest.mark.parametrize("colours", [tuple(CONTROLLER_COLOURS.values()), JOINT_COLOURS[:3]])
+def test_when_seen_with_a_colour_blindness_expect_the_colours_of_one_figure_to_differ(
+    matrix: list[list[float]], colours: tuple[str, ...]
+) -> None:
+    for a, b in combinations(colours, 2):
+        assert np.abs(simulated(a, matrix) - simulated(b, matrix)).max() > 0.08, (a, b)
