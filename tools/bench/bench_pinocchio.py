@@ -33,11 +33,11 @@ def rnea_program(*, may_build: bool) -> Competitor:
         may_build: False takes only what an earlier call has built.
     """
     program = BUILD / "rnea"
-    if not may_build:
-        return Competitor(program) if program.is_file() else Competitor(missing="not built in a quick run")
     prefix = wheel_prefix()
     if prefix is None:
         return Competitor(missing="the wheel `pin` with its C++ headers is not installed in this environment")
+    if not may_build:
+        return Competitor(program) if program.is_file() else Competitor(missing="not built in a quick run")
     print("building the Pinocchio competitor in build/bench-pinocchio", file=sys.stderr)
     configure = ["cmake", "-S", str(SOURCE), "-B", str(BUILD), "-G", "Ninja", f"-DPINOCCHIO_PREFIX={prefix}"]
     for command in (configure, ["cmake", "--build", str(BUILD)]):
