@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from quasilpv.conditions.blocks import pole_disk
 from quasilpv.lmi import Problem, Solution, Variable, block, to_rational, zeros
-from quasilpv.lmi.expressions import Matrix
+from quasilpv.lmi.exact import Matrix
 
 FEEDBACK_DISK = Fraction(3, 5)
 """Radius of the feedback pole disk, as a fraction of the distance of its centre from 1."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from math import lcm
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,14 +14,23 @@ Matrix: TypeAlias = npt.NDArray[Any]
 
 def to_rational(matrix: Any) -> Matrix:
     """Matrix of `fractions.Fraction`, each the exact value of its double (or integer, or rational) entry."""
-    array = np.asarray(matrix, dtype=object)
+    array: Matrix = np.asarray(matrix, dtype=object)
+    if array.size == 0:
+        return array.copy()
     return np.vectorize(lambda x: x if isinstance(x, Fraction) else Fraction(x), otypes=[object])(array)  # type: ignore[no-any-return]
+
+
+def symmetric_part(matrix: Matrix) -> Matrix:
+    """``(X + X') / 2``, exact for a rational matrix."""
+    return (matrix + matrix.T) * Fraction(1, 2)
 
 
 def is_positive_definite(matrix: Matrix) -> bool:
     """Whether a symmetric rational matrix is positive definite, decided without rounding.
 
-    Gaussian elimination without pivoting: ``M > 0`` if and only if all pivots of ``L D L'`` are positive.
+    The leading minors ``d_1, d_2, ...`` of an integer multiple of ``S M S`` are all positive (Sylvester), S a diagonal
+    of powers of two that brings the diagonal near one and keeps the integers short. Fraction-free elimination (Bareiss
+    1968): ``m_ij <- (d_k m_ij - m_ik m_kj) / d_{k-1}`` divides without remainder, and its pivots are the minors.
 
     Args:
         matrix: square array of `fractions.Fraction` or int, symmetric.
@@ -32,12 +42,30 @@ def is_positive_definite(matrix: Matrix) -> bool:
     size = work.shape[0]
     if work.shape != (size, size) or any(work[i, j] != work[j, i] for i in range(size) for j in range(i)):
         raise ValueError(f"expected a symmetric matrix, got shape {work.shape}")
-    for k in range(size):
-        pivot = work[k, k]
+    if any(work[k, k] <= 0 for k in range(size)):
+        return False
+    rows = _integer_rows(work)
+    previous = 1
+    for k, row in enumerate(rows):
+        pivot = row[0]
         if pivot <= 0:
             return False
-        for i in range(k + 1, size):
-            factor = work[i, k] / pivot
-            if factor:
-                work[i, k + 1 :] = work[i, k + 1 :] - factor * work[k, k + 1 :]
+        for i, below in enumerate(rows[k + 1 :], start=1):
+            factor = row[i]
+            below[:] = [(pivot * m - factor * r) // previous for m, r in zip(below, row[i:], strict=True)]
+        previous = pivot
     return True
+
+
+def _integer_rows(matrix: Matrix) -> list[list[int]]:
+    """Upper triangle, row by row, of an integer multiple of ``S M S``; S makes every diagonal entry about one."""
+    size = matrix.shape[0]
+    scale = [Fraction(2) ** (-(_binary_exponent(matrix[k, k]) // 2)) for k in range(size)]
+    rows = [[matrix[i, j] * scale[i] * scale[j] for j in range(i, size)] for i in range(size)]
+    common = lcm(*(entry.denominator for row in rows for entry in row))
+    return [[entry.numerator * (common // entry.denominator) for entry in row] for row in rows]
+
+
+def _binary_exponent(value: Fraction) -> int:
+    """About log2 of a positive rational of any size."""
+    return value.numerator.bit_length() - value.denominator.bit_length()

@@ -15,7 +15,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-Matrix: TypeAlias = npt.NDArray[Any]
+from quasilpv.lmi.exact import Matrix, to_rational
+
 Triplets: TypeAlias = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.float64]]
 
 _ids = itertools.count()
@@ -120,6 +121,15 @@ class Product:
         """Value of the term at X = value."""
         return self.left @ (value.T if self.transposed else value) @ self.right
 
+    def add_to(self, total: Matrix, value: Matrix) -> None:
+        """``total += left @ X @ right`` entry by entry, for exact scalars: constants are mostly zeros."""
+        middle = value.T if self.transposed else value
+        rows = [(i, p, self.left[i, p]) for i, p in np.argwhere(self.left)]
+        for q, j in np.argwhere(self.right):
+            factor = self.right[q, j]
+            for i, p, coefficient in rows:
+                total[i, j] += coefficient * middle[p, q] * factor
+
     def T(self) -> Product:
         """Transposed term."""
         return Product(self.right.T, self.variable, self.left.T, not self.transposed)
@@ -129,6 +139,16 @@ class Product:
         new_left = self.left if left is None else left @ self.left
         new_right = self.right if right is None else self.right @ right
         return Product(new_left, self.variable, new_right, self.transposed)
+
+    def times(self, factor: Any) -> Product:
+        """``factor * term`` for a number."""
+        return Product(self.left * factor, self.variable, self.right, self.transposed)
+
+    def placed(self, rows: slice, columns: slice, shape: tuple[int, int]) -> Product:
+        """The term as a block of an otherwise zero matrix of the given shape."""
+        left = _placed(self.left, rows, slice(None), (shape[0], self.left.shape[1]))
+        right = _placed(self.right, slice(None), columns, (self.right.shape[0], shape[1]))
+        return Product(left, self.variable, right, self.transposed)
 
     def map_constants(self, function: Callable[[Matrix], Matrix]) -> Product:
         """The same term with ``function`` applied to its constants."""
@@ -157,6 +177,11 @@ class ScalarProduct:
         """Value of the term at x = value."""
         return self.coefficient * value[0, 0]
 
+    def add_to(self, total: Matrix, value: Matrix) -> None:
+        """``total += x * coefficient`` entry by entry, for exact scalars."""
+        for i, j in np.argwhere(self.coefficient):
+            total[i, j] += self.coefficient[i, j] * value[0, 0]
+
     def T(self) -> ScalarProduct:
         """Transposed term."""
         return ScalarProduct(self.coefficient.T, self.variable)
@@ -165,6 +190,14 @@ class ScalarProduct:
         """``left @ term @ right``."""
         new = self.coefficient if left is None else left @ self.coefficient
         return ScalarProduct(new if right is None else new @ right, self.variable)
+
+    def times(self, factor: Any) -> ScalarProduct:
+        """``factor * term`` for a number."""
+        return ScalarProduct(self.coefficient * factor, self.variable)
+
+    def placed(self, rows: slice, columns: slice, shape: tuple[int, int]) -> ScalarProduct:
+        """The term as a block of an otherwise zero matrix of the given shape."""
+        return ScalarProduct(_placed(self.coefficient, rows, columns, shape), self.variable)
 
     def map_constants(self, function: Callable[[Matrix], Matrix]) -> ScalarProduct:
         """The same term with ``function`` applied to its constants."""
@@ -182,6 +215,12 @@ Operand: TypeAlias = "Expression | Variable | Matrix"
 
 def _zero(rows: int, cols: int) -> Matrix:
     return np.zeros((rows, cols), dtype=int).astype(object)
+
+
+def _placed(matrix: Matrix, rows: slice, columns: slice, shape: tuple[int, int]) -> Matrix:
+    larger = _zero(*shape)
+    larger[rows, columns] = matrix
+    return larger
 
 
 def _eye(size: int) -> Matrix:
@@ -236,9 +275,7 @@ class Expression:
                 raise ValueError(f"only a 1 x 1 expression multiplies a matrix with *, got {self.shape}")
             terms = tuple(_times_matrix(term, factor) for term in self.terms)
             return Expression(self.constant[0, 0] * factor, terms)
-        rows = self.shape[0]
-        left = _eye(rows) * factor
-        return Expression(self.constant * factor, tuple(term.scaled(left, None) for term in self.terms))
+        return Expression(self.constant * factor, tuple(term.times(factor) for term in self.terms))
 
     __rmul__ = __mul__
 
@@ -262,6 +299,14 @@ class Expression:
         total = self.constant
         for term in self.terms:
             total = total + term.at(values[term.variable])
+        return total
+
+    def at_exactly(self, values: Mapping[Variable, Matrix]) -> Matrix:
+        """Value at a point in rational arithmetic, doubles taken as the rationals they are. Errors as `at`."""
+        total = to_rational(self.constant)
+        exact = {variable: to_rational(values[variable]) for variable in self.variables}
+        for term in self.terms:
+            term.map_constants(to_rational).add_to(total, exact[term.variable])
         return total
 
     def map_constants(self, function: Callable[[Matrix], Matrix]) -> Expression:
@@ -333,19 +378,19 @@ def block(rows: Sequence[Sequence[Operand | None]]) -> Expression:
         grid.append(line)
     heights = [line[0].shape[0] for line in grid]
     widths = [entry.shape[1] for entry in grid[0]]
-    total = zeros(sum(heights), sum(widths))
+    shape = sum(heights), sum(widths)
+    total = _zero(*shape)
+    terms: list[Term] = []
     for i, line in enumerate(grid):
         for j, entry in enumerate(line):
             if entry.shape != (heights[i], widths[j]):
                 raise ValueError(f"block ({i}, {j}): got {entry.shape}, expected {(heights[i], widths[j])}")
-            place = _selector(heights, i)
-            total = total + place.T @ entry @ _selector(widths, j)
-    return total
+            place = _span(heights, i), _span(widths, j)
+            total[place] = entry.constant
+            terms += [term.placed(*place, shape) for term in entry.terms]
+    return Expression(total, tuple(terms))
 
 
-def _selector(sizes: Sequence[int], index: int) -> Matrix:
-    selector = _zero(sizes[index], sum(sizes))
+def _span(sizes: Sequence[int], index: int) -> slice:
     start = sum(sizes[:index])
-    for k in range(sizes[index]):
-        selector[k, start + k] = 1
-    return selector
+    return slice(start, start + sizes[index])

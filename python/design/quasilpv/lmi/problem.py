@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.lmi import clarabel_backend
-from quasilpv.lmi.exact import is_positive_definite, to_rational
-from quasilpv.lmi.expressions import Expression, Matrix, Operand, Variable, as_expression, identity
+from quasilpv.lmi.exact import Matrix, is_positive_definite, symmetric_part, to_rational
+from quasilpv.lmi.expressions import Expression, Operand, Variable, as_expression, identity
 
 
 class Outcome(Enum):
@@ -162,13 +162,8 @@ class Problem:
     def holds_exactly(self, values: Mapping[Variable, Matrix]) -> bool:
         """Whether every inequality holds strictly at the given point, with doubles taken as the rationals they are."""
         exact = {variable: to_rational(value) for variable, value in values.items()}
-        return all(is_positive_definite(to_rational(_rational(c.expression).at(exact))) for c in self._constraints)
+        return all(is_positive_definite(symmetric_part(c.expression.at_exactly(exact))) for c in self._constraints)
 
 
 def _symmetric(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return (matrix + matrix.T) / 2
-
-
-def _rational(expression: Expression) -> Expression:
-    """The same expression with every constant as an exact rational."""
-    return expression.map_constants(to_rational)
