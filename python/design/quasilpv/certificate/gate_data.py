@@ -1,0 +1,129 @@
+"""From an artifact, as a plain document, to the exact data the robust gate works on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from quasilpv.certificate.gate_inertia import ArmInertiaData, InertiaBlock, LinkData, Pair
+from quasilpv.certificate.gate_loop import AccelerationLoopData
+from quasilpv.errors import InputError
+
+LAW_KIND = "dob-acceleration"
+PAYLOAD_RULE = {"inertia_about_com": "unchanged", "fraction": [0.0, 1.0]}
+
+
+def loop_data(document: Mapping[str, Any], source: str = "artifact") -> AccelerationLoopData:
+    """The scalar loop of an artifact.
+
+    Args:
+        document: the artifact as a JSON tree.
+        source: what to call it in errors.
+
+    Raises:
+        InputError: another law than `dob-acceleration`, whose loop does not decouple into one scalar loop.
+    """
+    law = document["law"]
+    if law["kind"] != LAW_KIND:
+        raise InputError(source, "law.kind", law["kind"], f"{LAW_KIND}, whose frozen loop decouples")
+    feedback = law["feedback"]
+    l1, l2, l3, l4 = (float(gain) for gain in law["observer"])
+    return AccelerationLoopData(
+        sample_period_s=float(document["sample_period_s"]),
+        kp=float(feedback["kp"]),
+        kd=float(feedback["kd"]),
+        ki=float(feedback["ki"]),
+        observer=(l1, l2, l3, l4),
+        filter_time_constant_s=float(law["filter_time_constant_s"]),
+        disturbance_compensation=bool(law["disturbance_compensation"]),
+    )
+
+
+def arm_inertia_data(document: Mapping[str, Any], source: str = "artifact") -> ArmInertiaData:
+    """The true and the design inertia of an artifact.
+
+    Args:
+        document: the artifact as a JSON tree.
+        source: what to call it in errors.
+
+    Raises:
+        InputError: the robot is no planar serial arm, the payload set is another one than `PAYLOAD_RULE` describes, or
+            a premise is not the cosine of a sum of neighbouring joint angles.
+    """
+    links = document["robot"]["parameters"].get("links")
+    if not links:
+        raise InputError(source, "robot.parameters.links", links, "the links of a planar serial arm")
+    payloads = document["payloads"]
+    for field, rule in PAYLOAD_RULE.items():
+        if payloads.get(field) != rule:
+            raise InputError(source, f"payloads.{field}", payloads.get(field), str(rule))
+    inertia = document["law"]["inertia"]
+    premises = document["programs"]["premises"]["code"]
+    return ArmInertiaData(
+        links=tuple(LinkData(*(float(link[field]) for field in LinkData.__annotations__)) for link in links),
+        mass_scale=tuple(map(float, payloads["mass_scale"])),
+        com_scale=tuple(map(float, payloads["com_scale"])),
+        angle_rad=tuple((float(low), float(high)) for low, high in document["domain"]["angle_rad"]),
+        premise_lower=tuple(map(float, inertia["lower"])),
+        premise_upper=tuple(map(float, inertia["upper"])),
+        premise_pairs=cosine_pairs(premises, source),
+        blocks=tuple(
+            InertiaBlock(
+                tuple(block["premises"]),
+                tuple(tuple(tuple(map(float, row)) for row in vertex) for vertex in block["vertices"]),
+            )
+            for block in inertia["blocks"]
+        ),
+    )
+
+
+def cosine_pairs(code: Sequence[Sequence[Any]], source: str = "artifact") -> tuple[Pair, ...]:
+    """Read off a program of premises which cosine each of its outputs is.
+
+    The program is run on sums of joint angles instead of numbers: it may add, subtract and negate angles, and take
+    cosines ``cos(theta_{k+1} + ... + theta_l) = cos(alpha_l - alpha_k)`` of neighbouring ones.
+
+    Args:
+        code: the postfix program, as in an artifact.
+        source: what to call it in errors.
+
+    Returns:
+        The pair (k, l), k < l, of every output, joints counted from 0.
+
+    Raises:
+        InputError: the program computes something else.
+    """
+    angles: list[dict[int, int]] = []
+    pairs: list[Pair] = []
+    for name, *argument in code:
+        match name:
+            case "angle":
+                angles.append({int(argument[0]): 1})
+            case "neg" if angles:
+                angles.append(_combined({}, -1, angles.pop()))
+            case "add" | "sub" if len(angles) > 1:
+                right = angles.pop()
+                angles.append(_combined(angles.pop(), 1 if name == "add" else -1, right))
+            case "cos" if len(angles) == 1:
+                pairs.append(_pair(angles.pop(), source))
+            case _:
+                raise InputError(source, "programs.premises", name, "only cosines of sums of joint angles")
+    if angles:
+        raise InputError(source, "programs.premises", "an angle as output", "only cosines of sums of joint angles")
+    return tuple(pairs)
+
+
+def _combined(left: Mapping[int, int], sign: int, right: Mapping[int, int]) -> dict[int, int]:
+    """``left + sign * right`` as integer multiples of joint angles, zero multiples dropped."""
+    total = {joint: left.get(joint, 0) + sign * right.get(joint, 0) for joint in left.keys() | right.keys()}
+    return {joint: factor for joint, factor in total.items() if factor}
+
+
+def _pair(angle: Mapping[int, int], source: str) -> Pair:
+    """The pair of a sum of neighbouring joint angles; a cosine does not see the sign of the sum."""
+    joints = sorted(angle)
+    neighbours = joints and joints == list(range(joints[0], joints[-1] + 1)) and joints[0] > 0
+    if not neighbours or set(angle.values()) not in ({1}, {-1}):
+        got = " ".join(f"{factor:+d} theta_{joint + 1}" for joint, factor in sorted(angle.items()))
+        raise InputError(source, "programs.premises", f"cos({got})", "a sum of neighbouring joint angles after the first")
+    return joints[0] - 1, joints[-1]

@@ -1,0 +1,245 @@
+"""The needed range: which ``M_t / M_n`` occur over the operating domain and the payload set, proved by branch and bound.
+
+``c1 M_n < M_t < c2 M_n`` for every posture and every payload fraction bounds all eigenvalues of ``M_n^-1 M_t``, and
+implies, one subtracted from the other, that M_n is positive definite wherever the arm can be. Both are pencils of
+`gate_cells`: a cell that the guide does not accept is cut in two, a cell that it accepts is put to the exact test.
+
+Postures, not premises: cosines of angles that add up are dependent, and at the corners of the premise box there is no
+posture and sometimes no definite inertia.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal, TypeAlias
+
+import numpy as np
+from flint import fmpq
+
+from quasilpv.certificate.exact_matrices import rational
+from quasilpv.certificate.gate_cells import (
+    DEGREE,
+    Cells,
+    FloatArray,
+    Pencil,
+    are_positive_definite,
+    cosine_enclosure,
+    smallest_eigenvalues,
+)
+from quasilpv.certificate.gate_inertia import ArmInertiaData, design_inertia, to_float, to_floats, true_inertia
+from quasilpv.errors import InputError
+
+Side: TypeAlias = Literal["lowest", "highest"]
+
+TOLERANCE = 0.002
+LOOSEST_TOLERANCE = 0.1
+SAMPLES = 3000
+SAMPLED_FRACTIONS = 9
+CLIMB_STEPS = 60
+MAX_CELLS = 100_000
+GUIDE_SLACK = 1e-10
+BOUND_BITS = 30
+BOX_BITS = 100
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an inertia ratio occurs: joint angles (theta_1 does not matter) and payload fraction."""
+
+    angle_rad: tuple[float, ...]
+    payload_fraction: float
+    inertia_ratio: float
+
+
+@dataclass(frozen=True)
+class NeededRange:
+    """Proved bounds of ``M_t / M_n``, and sampled places that come close to them.
+
+    Attributes:
+        lowest: c1, with M_t > c1 M_n.
+        highest: c2, with M_t < c2 M_n.
+        where_lowest: a place whose smallest ratio is the smallest found.
+        where_highest: a place whose largest ratio is the largest found.
+        cells: how many cells the two proofs took.
+    """
+
+    lowest: fmpq
+    highest: fmpq
+    where_lowest: Place
+    where_highest: Place
+    cells: int
+
+    def to_floats(self) -> tuple[float, float]:
+        """The bounds as doubles."""
+        return to_float(self.lowest), to_float(self.highest)
+
+
+class InertiaPair:
+    """The true and the design inertia of one arm: exact pencils, and sampled ratios.
+
+    Raises:
+        InputError: on the operating domain a premise leaves the box the run-time clamps it to.
+    """
+
+    def __init__(self, data: ArmInertiaData) -> None:
+        """Build both inertias from the shipped data."""
+        _require_premises_inside_box(data)
+        self.data = data
+        self._true = true_inertia(data)
+        self._design = design_inertia(data)
+        n = data.joints
+        true = [[[to_float(self._true[i][j][p]) for p in range(DEGREE + 1)] for j in range(n)] for i in range(n)]
+        self._true_floats = np.array(true)
+        self._design_floats = to_floats(self._design.constant)
+        self._slope_floats = {pair: to_floats(slope) for pair, slope in self._design.slopes.items()}
+
+    def domain(self) -> Cells:
+        """All postures (theta_2 ... theta_n) and payload fractions as one cell."""
+        lower = [rational(low) for low, _ in self.data.angle_rad[1:]]
+        upper = [rational(high) for _, high in self.data.angle_rad[1:]]
+        return Cells.whole([*lower, fmpq(0)], [*upper, fmpq(1)])
+
+    def pencil(self, side: Side, bound: fmpq) -> Pencil:
+        """``M_t - bound M_n`` for a lowest ratio, ``bound M_n - M_t`` for a highest."""
+        n, pairs = self.data.joints, self.data.pairs
+        sign = 1 if side == "lowest" else -1
+        K = np.full((DEGREE + 1, 1 + len(pairs), n, n), fmpq(0), dtype=object)
+        for i, j in product(range(n), repeat=2):
+            place = 0 if i == j else 1 + pairs.index((min(i, j), max(i, j)))
+            for power in range(DEGREE + 1):
+                K[power, place, i, j] = sign * self._true[i][j][power]
+            K[0, 0, i, j] -= sign * bound * self._design.constant[i, j]
+            for pair, slope in self._design.slopes.items():
+                K[0, 1 + pairs.index(pair), i, j] -= sign * bound * slope[i, j]
+        rest = np.array([abs(bound) * entry for entry in self._design.rest.entries()], dtype=object)
+        return Pencil.over_common_denominator(K, rest.reshape(n, n))
+
+    def ratios(self, points: FloatArray) -> FloatArray:
+        """Eigenvalues of ``M_n^-1 M_t`` in doubles, ascending, (N, n), at points (theta_2 ... theta_n, f), (N, n).
+
+        Raises:
+            numpy.linalg.LinAlgError: M_n is not positive definite at one of the points.
+        """
+        absolute = np.cumsum(np.column_stack([np.zeros(len(points)), points[:, :-1]]), axis=1)
+        cosines = np.cos(absolute[:, :, None] - absolute[:, None, :])
+        powers = points[:, -1, None] ** np.arange(DEGREE + 1)
+        true = np.einsum("ijp,np->nij", self._true_floats, powers) * cosines
+        design = np.tile(self._design_floats, (len(points), 1, 1))
+        for (i, j), slope in self._slope_floats.items():
+            design += cosines[:, i, j, None, None] * slope
+        factor = np.linalg.cholesky(design)
+        half = np.linalg.solve(factor, true)
+        return np.asarray(np.linalg.eigvalsh(np.linalg.solve(factor, half.transpose(0, 2, 1))))
+
+    def samples(self) -> FloatArray:
+        """About `SAMPLES` points (theta_2 ... theta_n, f) of the domain, its bounds included."""
+        intervals = self.data.angle_rad[1:]
+        per_joint = max(3, round((SAMPLES / SAMPLED_FRACTIONS) ** (1 / max(1, len(intervals)))))
+        axes = [np.linspace(low, high, per_joint) for low, high in intervals]
+        axes.append(np.linspace(0.0, 1.0, SAMPLED_FRACTIONS))
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+
+    def place(self, point: FloatArray, ratio: float) -> Place:
+        """A point (theta_2 ... theta_n, f) with theta_1 at the middle of its interval."""
+        first = sum(self.data.angle_rad[0]) / 2
+        return Place((first, *map(float, point[:-1])), float(point[-1]), ratio)
+
+
+def needed_range(inertia: InertiaPair, tolerance: float = TOLERANCE) -> NeededRange | None:
+    """Prove bounds of ``M_t / M_n`` over the operating domain and all payload fractions in [0, 1].
+
+    Args:
+        inertia: true and design inertia.
+        tolerance: wanted relative distance of the bounds from ratios that occur; coarser if the proof gets too long.
+
+    Returns:
+        The bounds; None if the design inertia is not positive definite in some posture, or nothing can be proved.
+    """
+    try:
+        lowest = _Side(inertia, "lowest").prove(tolerance)
+        highest = _Side(inertia, "highest").prove(tolerance)
+    except np.linalg.LinAlgError:
+        return None
+    if lowest is None or highest is None:
+        return None
+    return NeededRange(lowest[0], highest[0], lowest[1], highest[1], lowest[2] + highest[2])
+
+
+class _Side:
+    """One bound: the most extreme ratio found so far, and the proof that little lies beyond it."""
+
+    def __init__(self, inertia: InertiaPair, side: Side) -> None:
+        self._inertia = inertia
+        self._side = side
+        self._sign = 1.0 if side == "highest" else -1.0
+        self._low, self._high = (bounds[0] for bounds in inertia.domain().bounds())
+        points = inertia.samples()
+        self._climb(points[self._extremes(points).argmax()])
+
+    def prove(self, tolerance: float) -> tuple[fmpq, Place, int] | None:
+        """Bound, place and cells; the tolerance is doubled when a proof takes too many cells."""
+        while tolerance < LOOSEST_TOLERANCE:
+            bound = self._bound(tolerance)
+            outcome = self._prove(bound)
+            if isinstance(outcome, int):
+                return bound, self._inertia.place(self._point, self._sign * self._value), outcome
+            if outcome is None:
+                tolerance *= 2
+            else:  # a more extreme ratio than the samples showed
+                self._climb(outcome)
+        return None
+
+    def _prove(self, bound: fmpq) -> int | FloatArray | None:
+        """Cells of a complete proof; or a point that refutes the bound; or None: too many cells."""
+        pairs = self._inertia.data.pairs
+        pencil = self._inertia.pencil(self._side, bound)
+        guide = pencil.to_floats()
+        cells, proved = self._inertia.domain(), 0
+        while len(cells):
+            if proved + len(cells) > MAX_CELLS:
+                return None
+            low, high = cells.bounds()
+            middle = (low + high) / 2
+            beyond = self._extremes(middle) > self._sign * to_float(bound)
+            if beyond.any():
+                return np.asarray(middle[int(beyond.argmax())])
+            smallest, axis = smallest_eigenvalues(guide, pairs, cells)
+            done = smallest > GUIDE_SLACK
+            done[done] = are_positive_definite(pencil, pairs, cells.only(done))
+            proved += int(done.sum())
+            cells = cells.only(~done).halved(axis[~done])
+        return proved
+
+    def _extremes(self, points: FloatArray) -> FloatArray:
+        """Largest ratio at each point, or smallest ratio with the opposite sign: larger is more extreme."""
+        return self._sign * self._inertia.ratios(points)[:, -1 if self._side == "highest" else 0]
+
+    def _climb(self, start: FloatArray) -> None:
+        """Pattern search from a point: the best neighbour at the current step, or half the step."""
+        self._point, self._value = start, float(self._extremes(start[None])[0])
+        step = (self._high - self._low) / 16
+        for _ in range(CLIMB_STEPS):
+            moves = np.vstack([np.diag(step), -np.diag(step)])
+            neighbours = np.clip(self._point + moves, self._low, self._high)
+            values = self._extremes(neighbours)
+            best = int(values.argmax())
+            if values[best] > self._value:
+                self._point, self._value = neighbours[best], float(values[best])
+            else:
+                step = step / 2
+
+    def _bound(self, tolerance: float) -> fmpq:
+        """The extreme ratio widened by the tolerance, rounded outwards to a short rational."""
+        wide = self._value + tolerance * abs(self._value)
+        return int(self._sign) * fmpq(int(np.ceil(wide * 2**BOUND_BITS)), 1 << BOUND_BITS)
+
+
+def _require_premises_inside_box(data: ArmInertiaData) -> None:
+    unit = 1 << BOX_BITS
+    for p, (i, j) in enumerate(data.premise_pairs):
+        low, high = (sum((rational(x[side]) for x in data.angle_rad[i + 1 : j + 1]), fmpq(0)) for side in (0, 1))
+        below, above = cosine_enclosure(low, high, BOX_BITS)
+        lower, upper = data.premise_lower[p], data.premise_upper[p]
+        if fmpq(below, unit) < rational(lower) or fmpq(above, unit) > rational(upper):
+            raise InputError("law", f"inertia: box of premise {p}", f"[{lower}, {upper}]", "its range on the domain")
