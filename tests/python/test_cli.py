@@ -318,6 +318,9 @@ def test_when_run_over_lcm_in_lock_step_expect_the_run_in_process(design: Design
 
 def test_when_run_in_real_time_expect_latencies_beside_both_accuracies(design: Design) -> None:
     outcome = design("hil", "serial-circle", "--controller", "ctc", "--real-time", "--json")
+    if outcome.code == 3:  # a machine that starves the processes for 20 ms must end in a fault stop
+        assert_refused(outcome, "end", code=3)
+        return
     row = json.loads(outcome.out)
     assert outcome.code == 0
     assert row["mode"] == "realtime"

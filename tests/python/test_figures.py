@@ -103,7 +103,7 @@ def test_when_the_error_is_drawn_exaggerated_expect_the_factor_in_the_legend_to_
     factor = float(label.rpartition("× ")[2])
     error = result.tool_position_m - result.reference_position_m
     expected = result.reference_position_m + factor * error
-    np.testing.assert_allclose(np.column_stack(drawn.get_data()), expected)  # type: ignore[arg-type]
+    np.testing.assert_allclose(np.column_stack(drawn.get_data()), expected)
     largest = factor * np.hypot(*error.T).max()
     assert 0.03 * np.ptp(expected, axis=0).max() < largest < 0.15 * np.ptp(expected, axis=0).max()
 

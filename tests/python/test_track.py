@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -90,9 +91,10 @@ def test_when_one_sample_of_a_run_changes_by_one_bit_expect_the_difference_named
     run = synthetic_run(samples=20, joints=2)
     values = np.array(getattr(run, field))
     values[17] = np.nextafter(values[17], np.inf) if values.dtype.kind == "f" else values[17] + 1
+    changed: dict[str, Any] = {field: values}
     assert run.first_difference(run) is None
     with pytest.raises(ClaimError, match=f"{field} differs first at sample 17"):
-        require_identical(replace(run, **{field: values}), run)
+        require_identical(replace(run, **changed), run)
 
 
 # ---- designs on disk -------------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from quasilpv.experiments.run import FloatArray, Run
 
 def synthetic_run(samples: int, joints: int) -> Run:
     """Smooth joint motions with small errors."""
-    time_s = 1e-3 * np.arange(samples)
+    time_s = np.arange(samples, dtype=np.float64) * 1e-3
     phase = np.arange(joints)
     angle = np.sin(2.0 * time_s[:, None] + phase)
     speed = 2.0 * np.cos(2.0 * time_s[:, None] + phase)

@@ -194,9 +194,19 @@ def _run_both(commands: dict[str, list[str]], limit_s: float) -> dict[str, dict[
 
 
 def _raise_failure(program: str, process: subprocess.Popen[str]) -> None:
-    """Raise the exception that the exit code of an ended process stands for, with its own line as message."""
-    _, errors = process.communicate()
-    line = (errors.strip().splitlines() or [f"{program}: exit code {process.returncode}"])[-1]
+    """Raise the exception that the exit code of an ended process stands for, in its own words."""
+    output, errors = process.communicate()
+    line = errors.strip().splitlines()[-1].removeprefix(f"{program}: ") if errors.strip() else _ending(output)
     if process.returncode == 2:
-        raise InputError(program, "input", line.removeprefix(f"{program}: "), "files both programs accept")
-    raise _ERRORS.get(process.returncode, QuasilpvError)(line)
+        raise InputError(program, "input", line, "files both programs accept")
+    raise _ERRORS.get(process.returncode, QuasilpvError)(f"{program}: exit code {process.returncode}: {line}")
+
+
+def _ending(output: str) -> str:
+    """How a run ended, from the report of a process that had no error of its own."""
+    try:
+        report = json.loads(output)
+    except ValueError:
+        return "no report"
+    fields = ("end", "controller_state", "state", "fault_cause", "last_seq", "samples")
+    return ", ".join(f"{name.replace('_', ' ')} {report[name]}" for name in fields if name in report)
