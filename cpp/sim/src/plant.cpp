@@ -8,6 +8,7 @@ Eigen::VectorXd Plant::absolute_tolerance(double tolerance) const {
   return Eigen::VectorXd::Constant(size(), tolerance);
 }
 
+// NOLINTNEXTLINE(performance-unnecessary-value-param): Eigen passes writable references by value.
 void Plant::make_consistent(double t, Vector y, Vector y_dot) const { derivative(t, y, y_dot); }
 
 JointArray Plant::joint_torque(double t) const noexcept {

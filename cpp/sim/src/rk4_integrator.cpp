@@ -1,6 +1,8 @@
 #include "quasilpv/rk4_integrator.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
 #include "quasilpv/errors.hpp"
@@ -22,12 +24,12 @@ Rk4Integrator::Rk4Integrator(const Plant& plant, double step_s)
 void Rk4Integrator::advance(double from_s, double to_s, Eigen::VectorXd& y) {
   const double length = to_s - from_s;
   // A sample that is a whole number of steps must not get one more because its length was rounded up.
-  const double steps = std::max(1.0, std::ceil(length / step_s_ * (1.0 - 1e-9)));
-  const double h = length / steps;
+  const std::int64_t steps = static_cast<std::int64_t>(std::max(1.0, std::ceil(length / step_s_ * (1.0 - 1e-9))));
+  const double h = length / static_cast<double>(steps);
   state_ = y;
   plant_.make_consistent(from_s, state_, slope_);
-  for (double i = 0.0; i < steps; i += 1.0) {
-    step(from_s + i * h, h, state_);
+  for (std::int64_t i = 0; i < steps; ++i) {
+    step(from_s + static_cast<double>(i) * h, h, state_);
   }
   if (!state_.allFinite()) {
     throw PlantError("Runge-Kutta integrator: the state is not finite at t = " + std::to_string(to_s) + " s");

@@ -114,7 +114,7 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
   return scenario;
 }
 
-int Scenario::joints() const noexcept {
+int Scenario::joints() const {
   return std::visit([](const auto& parameters) { return joints_of(parameters); }, plant);
 }
 

@@ -35,7 +35,7 @@ struct Scenario {
   static Scenario load(const std::string& path);
   static Scenario parse(std::string_view bytes, const std::string& source);
 
-  int joints() const noexcept;
+  int joints() const;
 
   /// The true plant at rest under no control torque, external torque attached. INIT-ONLY. Throws InputError.
   std::unique_ptr<Plant> make_plant() const;
