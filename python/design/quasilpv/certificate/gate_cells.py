@@ -9,8 +9,8 @@ on [u, v], X > 0 on the whole cell if for each of them and for every corner sigm
 
     r_j = row sums of  rest + sum_k H_k^2 / 2 |K_jk|   (entrywise),   H_k = h_{i+1} + ... + h_j:
 
-X(f) is a convex combination of the X_j; by Taylor's theorem ``cos(s_k)`` differs from its tangent by at most H_k^2 / 2; a
-symmetric matrix whose entries are at most R_ab in absolute value is at most the diagonal matrix of the row sums of R;
+X(f) is a convex combination of the X_j; by Taylor's theorem ``cos(s_k)`` differs from its tangent by at most H_k^2 / 2;
+a symmetric matrix whose entries are at most R_ab in absolute value is at most the diagonal matrix of the row sums of R;
 and what is affine in the deviations is positive definite on a box if it is at its corners. The overestimate is
 quadratic in the size of the cell.
 
@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from itertools import product
 from typing import Any, TypeAlias
 
@@ -43,40 +43,38 @@ IntegerArray: TypeAlias = npt.NDArray[Any]
 DEGREE = 3
 ANGLE_BITS = 40
 MAX_SCALE_BITS = 20
+COEFFICIENT_BITS = 64
 
 
 @dataclass(frozen=True, eq=False)
 class Pencil:
-    """See the module; rational coefficients over one common positive denominator, which definiteness does not see.
+    """See the module; integer coefficients in a unit of its own, which definiteness does not see.
 
     Attributes:
-        coefficients: integers, shape (4, 1 + m, n, n): power of f, then constant and m cosines.
-        rest: integers, shape (n, n).
+        coefficients: shape (4, 1 + m, n, n): power of f, then constant and m cosines.
+        rest: shape (n, n).
     """
 
     coefficients: IntegerArray
     rest: IntegerArray
 
     @classmethod
-    def over_common_denominator(cls, coefficients: IntegerArray, rest: IntegerArray) -> Pencil:
-        """From rational arrays of these shapes; rows and columns scaled alike by powers of two, so that no link is small.
+    def enclosing(cls, coefficients: IntegerArray, rest: IntegerArray) -> Pencil:
+        """From rational arrays of these shapes: scaled, and rounded down with the error added to the rest.
 
-        The congruence does not change definiteness, but it makes the row sums of the test less pessimistic.
+        Rows and columns are scaled alike by powers of two so that no link is small: that congruence leaves definiteness
+        alone and makes the row sums of the test less pessimistic. f and cosines are at most 1 in absolute value, so the
+        errors of all terms of an entry add up to less than the number of terms.
         """
         diagonal = [abs(int(x.p) / int(x.q)) for x in coefficients[0, 0].diagonal()]
-        largest = max(diagonal)
-        power = [round(math.log2(largest / x) / 2) if x > 0 else 0 for x in diagonal]
+        power = [round(math.log2(max(diagonal) / x) / 2) if x > 0 else 0 for x in diagonal]
         scale = np.array([fmpq(1 << min(exponent, MAX_SCALE_BITS)) for exponent in power], dtype=object)
         coefficients = coefficients * scale[:, None] * scale
-        rest = rest * scale[:, None] * scale
-        every = [*coefficients.ravel(), *rest.ravel()]
-        denominator = math.lcm(*(int(entry.q) for entry in every))
-
-        def integers(array: IntegerArray) -> IntegerArray:
-            flat = [int(entry.p) * (denominator // int(entry.q)) for entry in array.ravel()]
-            return np.array(flat, dtype=object).reshape(array.shape)
-
-        return cls(integers(coefficients), integers(rest))
+        unit = max(map(abs, coefficients.ravel())) / (1 << COEFFICIENT_BITS)
+        terms = coefficients.shape[0] * coefficients.shape[1]
+        rounded = np.array([int((x / unit).floor()) for x in coefficients.ravel()], dtype=object)
+        bounds = [int((x / unit).ceil()) + terms for x in (rest * scale[:, None] * scale).ravel()]
+        return cls(rounded.reshape(coefficients.shape), np.array(bounds, dtype=object).reshape(rest.shape))
 
     def to_floats(self) -> tuple[FloatArray, FloatArray]:
         """Coefficients and rest as doubles, scaled so that the largest coefficient is 1."""
@@ -201,15 +199,15 @@ def are_positive_definite(pencil: Pencil, pairs: Sequence[Pair], cells: Cells) -
 def cosine_enclosure(low: fmpq, high: fmpq, bits: int) -> tuple[int, int]:
     """Integers a, b with ``a <= 2^bits cos(x) <= b`` for every x in [low, high], tight to one unit.
 
-    A cosine is monotone between neighbouring multiples of pi: its range is that of its ends and of the multiples between.
+    A cosine is monotone between neighbouring multiples of pi: its range is spanned by its ends and the multiples in it.
     """
     unit = 1 << bits
     with ctx.workprec(2 * bits):
         ends = [arb(x).cos() * unit for x in (low, high)]
-        first = int((arb(low) / arb.pi()).lower().ceil().unique_fmpz())
-        last = int((arb(high) / arb.pi()).upper().floor().unique_fmpz())
-        below = min(int(end.lower().floor().unique_fmpz()) for end in ends)
-        above = max(int(end.upper().ceil().unique_fmpz()) for end in ends)
+        first = int((arb(low) / arb.pi()).lower().fmpq().ceil())
+        last = int((arb(high) / arb.pi()).upper().fmpq().floor())
+        below = min(int(end.lower().fmpq().floor()) for end in ends)
+        above = max(int(end.upper().fmpq().ceil()) for end in ends)
     for multiple in range(first, min(last, first + 1) + 1):
         below, above = (min(below, -unit), above) if multiple % 2 else (below, max(above, unit))
     return max(below, -unit), min(above, unit)
@@ -240,7 +238,7 @@ def _exact_postures(pairs: Sequence[Pair], cells: Cells) -> tuple[IntegerArray, 
 
 def _rounded_down(ball: arb) -> int:
     """An integer at most 2 below every number of a ball narrower than 1."""
-    return int(ball.lower().floor().unique_fmpz())
+    return int(ball.lower().fmpq().floor())
 
 
 def _pair_matrix(pairs: Sequence[Pair], angles: int) -> FloatArray:
@@ -252,7 +250,7 @@ def _pair_matrix(pairs: Sequence[Pair], angles: int) -> FloatArray:
 
 
 def _blossom(u: Any, v: Any, unit: Any = 1) -> list[list[Any]]:
-    """Rows j, columns p: 3 times the Bernstein coefficient j of ``f^p`` on [u, v], degree 3; u and v in units of 1/unit.
+    """Rows j, columns p: 3 times the Bernstein coefficient j of ``f^p`` on [u, v], degree 3; u, v in units of 1/unit.
 
     The coefficient is the elementary symmetric polynomial of degree p of (v repeated j times, u repeated 3 - j times)
     over binomial(3, p); everything is multiplied by ``unit^3``.
@@ -266,7 +264,7 @@ def _blossom(u: Any, v: Any, unit: Any = 1) -> list[list[Any]]:
     return rows
 
 
-@lru_cache(maxsize=None)
+@cache
 def _signs(size: int) -> FloatArray:
     """All sign vectors of a size, one per row."""
     return np.array(list(product((1.0, -1.0), repeat=size))).reshape(-1, size)

@@ -125,5 +125,5 @@ def _pair(angle: Mapping[int, int], source: str) -> Pair:
     neighbours = joints and joints == list(range(joints[0], joints[-1] + 1)) and joints[0] > 0
     if not neighbours or set(angle.values()) not in ({1}, {-1}):
         got = " ".join(f"{factor:+d} theta_{joint + 1}" for joint, factor in sorted(angle.items()))
-        raise InputError(source, "programs.premises", f"cos({got})", "a sum of neighbouring joint angles after the first")
+        raise InputError(source, "programs.premises", f"cos({got})", "a sum of neighbouring angles after the first")
     return joints[0] - 1, joints[-1]

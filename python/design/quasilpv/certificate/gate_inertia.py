@@ -7,8 +7,8 @@ of the arm is ``M_t = S' [D_kl(f) cos(alpha_k - alpha_l)] S`` with
 
 (I_k about the joint axis), where at payload fraction f link i has mass ``m_i (1 + f (mass_scale_i - 1))``, centre of
 mass ``r_i (1 + f (com_scale_i - 1))`` and the nominal moment of inertia about its centre of mass, so that D is a cubic
-in f. The design inertia M_n is collapsed from the artifact's vertices, not from what they were made of. Definiteness does
-not change under the congruence with S, and everything here is in absolute angles.
+in f. The design inertia M_n is collapsed from the artifact's vertices, not from what they were made of. Definiteness
+does not change under the congruence with S, and everything here is in absolute angles.
 """
 
 from __future__ import annotations
@@ -18,25 +18,13 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import TypeAlias
 
-import numpy as np
-import numpy.typing as npt
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import fmpq_mat, fmpq_poly
 
 from quasilpv.certificate.exact_matrices import is_symmetric, matrix, rational, zero
 from quasilpv.errors import InputError
 
 Pair: TypeAlias = tuple[int, int]
 Interval: TypeAlias = tuple[float, float]
-
-
-def to_float(value: fmpq) -> float:
-    """The double nearest to a rational."""
-    return int(value.p) / int(value.q)
-
-
-def to_floats(exact: fmpq_mat) -> npt.NDArray[np.float64]:
-    """A rational matrix in doubles."""
-    return np.array([[to_float(entry) for entry in row] for row in exact.table()])
 
 
 @dataclass(frozen=True)
@@ -99,7 +87,7 @@ class ArmInertiaData:
         for index, block in enumerate(self.blocks):
             for vertex in block.vertices:
                 if len(vertex) != n or not is_symmetric(matrix(vertex)):
-                    raise InputError("law", f"inertia.blocks[{index}]", "another matrix", f"symmetric {n} x {n} vertices")
+                    raise InputError("law", f"inertia.blocks[{index}]", "another vertex", f"symmetric, {n} x {n}")
 
     @property
     def joints(self) -> int:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 from flint import arb, fmpq
 
-from quasilpv.certificate.gate_inertia import to_float
 from quasilpv.certificate.gate_loop import AccelerationLoopData, CharacteristicPolynomial, Controller
 from quasilpv.certificate.gate_polynomials import critical_values, is_schur
+from quasilpv.certificate.gate_rationals import float_at_least, float_at_most
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class InertiaMargin:
         return low < lowest and (high is None or highest < high)
 
     def to_floats(self) -> tuple[float, float | None]:
-        """The proved bounds as doubles."""
+        """The proved bounds as doubles, rounded inwards."""
         low, high = self.inner
-        return to_float(low), None if high is None else to_float(high)
+        return float_at_least(low), None if high is None else float_at_most(high)
 
 
 def inertia_margin(data: AccelerationLoopData, delay_samples: fmpq) -> InertiaMargin | None:
@@ -83,7 +83,7 @@ def _nearest(values: Sequence[arb], nearest: Callable[[Iterable[fmpq]], fmpq]) -
 
 def _intersection(margins: Sequence[InertiaMargin]) -> InertiaMargin:
     """What holds for all of several loops; their outer bounds are taken from the same loop as the inner ones."""
-    lower = max(margins, key=lambda margin: margin.inner[0])
-    bounded = [margin for margin in margins if margin.inner[1] is not None]
-    upper = min(bounded, key=lambda margin: margin.inner[1], default=lower)
-    return InertiaMargin((lower.inner[0], upper.inner[1]), (lower.outer[0], upper.outer[1]))
+    low, outer_low = max((margin.inner[0], margin.outer[0]) for margin in margins)
+    bounded = [(margin.inner[1], margin.outer[1]) for margin in margins if margin.inner[1] is not None]
+    high, outer_high = min(bounded, key=lambda bounds: bounds[0]) if bounded else (None, None)
+    return InertiaMargin((low, high), (outer_low, outer_high))

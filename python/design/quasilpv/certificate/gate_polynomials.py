@@ -7,6 +7,7 @@ enclosures of irrational numbers, which are balls of Arb arithmetic and contain 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from flint import arb, arb_poly, ctx, fmpq, fmpq_poly, fmpz_poly
 
@@ -48,8 +49,9 @@ class CircleProduct:
 
     @classmethod
     def of(cls, F: fmpq_poly, G: fmpq_poly) -> CircleProduct:
-        """Sum ``s_d e^(i d phi)`` over the lags d of the coefficients, with ``cos(d phi)`` and ``sin(d phi) / sin(phi)``
-        written as Chebyshev polynomials of the first and second kind.
+        """Sum ``s_d e^(i d phi)`` over the lags d of the coefficients.
+
+        ``cos(d phi)`` and ``sin(d phi) / sin(phi)`` are Chebyshev polynomials of the first and second kind of c.
         """
         degree = max(F.degree(), G.degree())
         reversed_g = fmpq_poly([G[degree - k] for k in range(degree + 1)])
@@ -65,18 +67,19 @@ class CircleProduct:
 def roots_between(polynomial: fmpq_poly) -> list[arb]:
     """Enclosures that together contain every real root in the open interval (-1, 1), multiplicities dropped.
 
-    The enclosures come from Arb's root isolation, which certifies that they are disjoint, contain one root each of the
-    square-free part, and that a root with zero imaginary part is real. A root that cannot be told from the ends is kept.
+    The enclosures come from Arb's root isolation, which certifies that each contains one root of the square-free part,
+    and sets the imaginary part to zero exactly for the real roots. A root that cannot be told from an end is kept.
 
     Args:
         polynomial: not zero.
     """
     ends = (fmpq_poly([-1, 1]), fmpq_poly([1, 1]))
     for end in ends:
-        while polynomial.degree() > 0 and polynomial % end == 0:
+        while polynomial.degree() > 0 and (polynomial % end).is_zero():
             polynomial = polynomial // end
-    roots = [root for root, _ in polynomial.numer().complex_roots()] if polynomial.degree() > 0 else []
-    return [root.real for root in roots if root.imag == 0 and not (root.real <= -1 or root.real >= 1)]
+    isolated: list[Any] = polynomial.numer().complex_roots() if polynomial.degree() > 0 else []
+    real = [root.real for root, _ in isolated if root.imag == 0]
+    return [root for root in real if not (root <= -1 or root >= 1)]
 
 
 def critical_values(F: fmpq_poly, G: fmpq_poly) -> list[arb]:
@@ -96,7 +99,7 @@ def critical_values(F: fmpq_poly, G: fmpq_poly) -> list[arb]:
     found = [arb(-F(z) / G(z)) for z in (fmpq(1), fmpq(-1)) if G(z) != 0]
     product, square = CircleProduct.of(F, G), CircleProduct.of(G, G).real
     crossings = product.imaginary
-    if crossings == 0:
+    if crossings.is_zero():
         raise ArithmeticError("F/G is real on the whole unit circle")
     while (common := crossings.gcd(square)).degree() > 0:
         crossings = crossings // common

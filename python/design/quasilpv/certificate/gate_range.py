@@ -1,4 +1,4 @@
-"""The needed range: which ``M_t / M_n`` occur over the operating domain and the payload set, proved by branch and bound.
+"""The needed range: which ``M_t / M_n`` occur over operating domain and payload set, proved by branch and bound.
 
 ``c1 M_n < M_t < c2 M_n`` for every posture and every payload fraction bounds all eigenvalues of ``M_n^-1 M_t``, and
 implies, one subtracted from the other, that M_n is positive definite wherever the arm can be. Both are pencils of
@@ -27,12 +27,13 @@ from quasilpv.certificate.gate_cells import (
     cosine_enclosure,
     smallest_eigenvalues,
 )
-from quasilpv.certificate.gate_inertia import ArmInertiaData, design_inertia, to_float, to_floats, true_inertia
+from quasilpv.certificate.gate_inertia import ArmInertiaData, design_inertia, true_inertia
+from quasilpv.certificate.gate_rationals import float_at_least, float_at_most, to_float, to_floats
 from quasilpv.errors import InputError
 
 Side: TypeAlias = Literal["lowest", "highest"]
 
-TOLERANCE = 0.002
+TOLERANCE = 0.001
 LOOSEST_TOLERANCE = 0.1
 SAMPLES = 3000
 SAMPLED_FRACTIONS = 9
@@ -71,8 +72,8 @@ class NeededRange:
     cells: int
 
     def to_floats(self) -> tuple[float, float]:
-        """The bounds as doubles."""
-        return to_float(self.lowest), to_float(self.highest)
+        """The bounds as doubles, rounded outwards."""
+        return float_at_most(self.lowest), float_at_least(self.highest)
 
 
 class InertiaPair:
@@ -113,7 +114,7 @@ class InertiaPair:
             for pair, slope in self._design.slopes.items():
                 K[0, 1 + pairs.index(pair), i, j] -= sign * bound * slope[i, j]
         rest = np.array([abs(bound) * entry for entry in self._design.rest.entries()], dtype=object)
-        return Pencil.over_common_denominator(K, rest.reshape(n, n))
+        return Pencil.enclosing(K, rest.reshape(n, n))
 
     def ratios(self, points: FloatArray) -> FloatArray:
         """Eigenvalues of ``M_n^-1 M_t`` in doubles, ascending, (N, n), at points (theta_2 ... theta_n, f), (N, n).
@@ -139,6 +140,13 @@ class InertiaPair:
         axes = [np.linspace(low, high, per_joint) for low, high in intervals]
         axes.append(np.linspace(0.0, 1.0, SAMPLED_FRACTIONS))
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+
+    def nearest_place(self, ratio: float) -> Place:
+        """The sampled place one of whose ratios is nearest to a given one."""
+        points = self.samples()
+        ratios = self.ratios(points)
+        row, column = np.unravel_index(int(np.abs(ratios - ratio).argmin()), ratios.shape)
+        return self.place(points[row], float(ratios[row, column]))
 
     def place(self, point: FloatArray, ratio: float) -> Place:
         """A point (theta_2 ... theta_n, f) with theta_1 at the middle of its interval."""

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import typer
 
 from quasilpv import __version__
-from quasilpv.cli import hil, inspect, listing, synth, track, verify
+from quasilpv.cli import hil, inspect, listing, robust, synth, track, verify
 from quasilpv.errors import (
     ClaimError,
     FaultStop,
@@ -37,6 +37,7 @@ Examples:
   design list
   design synth arm3 -o out/arm3
   design inspect out/arm3/artifact.json
+  design robust out/arm3/artifact.json
   design track serial-square serial-circle
   design hil serial-square --real-time
 
@@ -77,6 +78,7 @@ app.command("list")(listing.list_command)
 app.command("synth")(synth.synth_command)
 app.command("inspect")(inspect.inspect_command)
 app.command("verify")(verify.verify_command)
+app.command("robust")(robust.robust_command)
 app.command("track")(track.track_command)
 app.command("hil")(hil.hil_command)
 

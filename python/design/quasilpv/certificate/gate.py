@@ -1,0 +1,200 @@
+"""The robust gate of the acceleration-level law: a theorem about every posture, payload and small delay, or a refusal.
+
+In the coordinates that diagonalise ``M_t^-1 M_n`` (similar to a symmetric positive definite matrix, so its eigenvalues
+mu are real and positive) the frozen sampled loop of n joints is n copies of one scalar loop. It is stable in every
+posture of the operating domain, with every payload and with every constant transport delay up to the specified one,
+if the *needed range* of ``M_t / M_n = 1 / mu`` lies in the *inertia margin* of the scalar loop at all these delays. All
+three are proved in exact or ball arithmetic (``docs/concepts/robust-gate.md`` says what is not).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from flint import fmpq, fmpq_poly
+
+from quasilpv.certificate.gate_data import arm_inertia_data, loop_data
+from quasilpv.certificate.gate_delay import DelayMargin, delay_margin
+from quasilpv.certificate.gate_loop import AccelerationLoopData, CharacteristicPolynomial, Controller
+from quasilpv.certificate.gate_margin import InertiaMargin, inertia_margin
+from quasilpv.certificate.gate_range import InertiaPair, NeededRange, Place, needed_range
+from quasilpv.certificate.gate_rationals import float_at_most, to_float
+
+HALF_A_SAMPLE = fmpq(1, 2)
+GROWTH_RATIOS = 61
+CURVE_POINTS = 41
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WorstCase:
+    """Numerical, not proved: the largest growth rate over the needed range, and a place where such a ratio occurs."""
+
+    growth_rate_per_s: float
+    delay_s: float
+    place: Place
+
+
+@dataclass(frozen=True)
+class RobustGate:
+    """The verdict, and what it rests on.
+
+    Attributes:
+        loop: the law as shipped.
+        specified_delay_samples: the transport delay the design has to tolerate.
+        margin: inertia margin at that delay; None if the loop is not stable at ``M_t = M_n``.
+        needed: which ratios occur; None if no bounds could be proved.
+        delays: up to which delay the needed range is inside; None without a needed range.
+        worst: numerical worst case over the needed range; None without one.
+    """
+
+    loop: AccelerationLoopData
+    specified_delay_samples: fmpq
+    margin: InertiaMargin | None
+    needed: NeededRange | None
+    delays: DelayMargin | None
+    worst: WorstCase | None
+
+    @property
+    def passed(self) -> bool:
+        """Whether the needed range is proved inside the margin for every constant delay up to the specified one."""
+        if self.margin is None or self.needed is None or self.delays is None or self.delays.proved is None:
+            return False
+        inside = self.margin.contains(self.needed.lowest, self.needed.highest)
+        return inside and self.delays.proved >= self.specified_delay_samples
+
+    @property
+    def delay_margin_s(self) -> float | None:
+        """The largest proved delay; None if the needed range is not inside the margin even without delay."""
+        if self.delays is None or self.delays.proved is None:
+            return None
+        return float_at_most(self.delays.proved * self.sample_period)
+
+    @property
+    def sample_period(self) -> fmpq:
+        """T, exactly."""
+        return fmpq(*self.loop.sample_period_s.as_integer_ratio())
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON-able: what ``design robust --json`` prints, bounds rounded to the safe side.
+
+        null stands for no bound (upper end of the margin) or no value. This gate passes only what it proves; `proved`
+        tells it from a gate that samples.
+        """
+        worst = self.worst
+        where = None if worst is None else {**_place_document(worst.place), "delay_s": worst.delay_s}
+        return {
+            "passed": self.passed,
+            "proved": self.passed,
+            "inertia_margin": None if self.margin is None else list(self.margin.to_floats()),
+            "delay_margin_s": self.delay_margin_s,
+            "needed_range": None if self.needed is None else list(self.needed.to_floats()),
+            "worst_growth_rate_per_s": None if worst is None else worst.growth_rate_per_s,
+            "where": where,
+        }
+
+
+def robust_gate(
+    document: Mapping[str, Any], source: str = "artifact", delay_samples: fmpq = HALF_A_SAMPLE
+) -> RobustGate:
+    """Put an artifact to the gate.
+
+    Args:
+        document: the artifact as a JSON tree.
+        source: what to call it in errors.
+        delay_samples: the transport delay it has to tolerate, in samples.
+
+    Raises:
+        InputError: another law than `dob-acceleration`, another robot than a planar serial arm, or data that contradict
+            each other.
+    """
+    loop = loop_data(document, source)
+    inertia = InertiaPair(arm_inertia_data(document, source))
+    margin, needed = inertia_margin(loop, delay_samples), needed_range(inertia)
+    if needed is None:
+        return RobustGate(loop, delay_samples, margin, None, None, None)
+    delays = delay_margin(loop, needed.lowest, needed.highest)
+    worst = worst_case(loop, inertia, needed, (fmpq(0), delay_samples))
+    return RobustGate(loop, delay_samples, margin, needed, delays, worst)
+
+
+@dataclass(frozen=True, eq=False)
+class MarginCurve:
+    """The proved inertia margin at a series of delays.
+
+    Attributes:
+        delay_s: (N,).
+        lowest: (N,) lower limits of ``M_t / M_n``, NaN where the loop is not stable at ``M_t = M_n``.
+        highest: (N,) upper limits, infinite where there is none, NaN as above.
+    """
+
+    delay_s: FloatArray
+    lowest: FloatArray
+    highest: FloatArray
+
+
+def margin_curve(loop: AccelerationLoopData, longest_samples: fmpq, points: int = CURVE_POINTS) -> MarginCurve:
+    """The inertia margin at equally spaced delays from 0 to the longest.
+
+    Args:
+        loop: the law as shipped.
+        longest_samples: > 0, in samples.
+        points: how many, at least 2.
+    """
+    delays = [longest_samples * k / (points - 1) for k in range(points)]
+    limits = np.full((points, 2), np.nan)
+    for row, delay in enumerate(delays):
+        margin = inertia_margin(loop, delay)
+        if margin is not None:
+            low, high = margin.to_floats()
+            limits[row] = low, np.inf if high is None else high
+    delay_s = np.array([to_float(delay) for delay in delays]) * loop.sample_period_s
+    return MarginCurve(delay_s, limits[:, 0], limits[:, 1])
+
+
+def worst_case(
+    loop: AccelerationLoopData, inertia: InertiaPair, needed: NeededRange, delays: Sequence[fmpq]
+) -> WorstCase:
+    """Largest ``log(spectral radius) / T`` over a grid of the needed range and some delays, in double arithmetic.
+
+    Args:
+        loop: the law as shipped.
+        inertia: where ratios occur.
+        needed: the range.
+        delays: transport delays in samples.
+    """
+    ratios = np.geomspace(*needed.to_floats(), GROWTH_RATIOS)
+    rates = {delay: growth_rates(loop, delay, ratios) for delay in delays}
+    delay = max(rates, key=lambda key: float(rates[key].max()))
+    row = int(rates[delay].argmax())
+    place = min(
+        (needed.where_lowest, needed.where_highest, inertia.nearest_place(float(ratios[row]))),
+        key=lambda candidate: abs(candidate.inertia_ratio - ratios[row]),
+    )
+    return WorstCase(float(rates[delay][row]), to_float(delay) * loop.sample_period_s, place)
+
+
+def growth_rates(loop: AccelerationLoopData, delay_samples: fmpq, ratios: FloatArray) -> FloatArray:
+    """``log(largest root) / T`` at each ratio ``M_t / M_n``, 1/s, numerical.
+
+    The slow roots are clustered near z = 1: computed as roots in ``zeta = z - 1``, around 0, they keep their digits.
+    """
+    polynomial = CharacteristicPolynomial.of(Controller.of(loop, loop.filter_poles()[0]), delay_samples)
+    shift = fmpq_poly([1, 1])
+    F, G = (np.array([to_float(x) for x in part(shift).coeffs()[::-1]]) for part in (polynomial.F, polynomial.G))
+    G = np.concatenate([np.zeros(F.size - G.size), G])
+    radius = [np.abs(1.0 + np.roots(F + G / ratio)).max() for ratio in ratios]
+    return np.asarray(np.log(radius) / loop.sample_period_s)
+
+
+def _place_document(place: Place) -> dict[str, Any]:
+    return {
+        "angle_rad": list(place.angle_rad),
+        "payload_fraction": place.payload_fraction,
+        "inertia_ratio": place.inertia_ratio,
+    }

@@ -1,0 +1,99 @@
+"""``design robust``: the robust gate, a proof for every posture, payload and small delay, or a refusal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from flint import fmpq
+from matplotlib.figure import Figure
+
+from quasilpv.artifact import read_artifact
+from quasilpv.certificate.gate import RobustGate, margin_curve, robust_gate
+from quasilpv.certificate.gate_rationals import to_float
+from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
+from quasilpv.figures.margins import margin_figure
+from quasilpv.figures.style import save
+
+FIGURE_NAME = "inertia-margin"
+BEYOND_THE_MARGIN = fmpq(3, 2)
+SHORTEST_CURVE_SAMPLES = fmpq(1)
+
+
+def robust_command(
+    artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="File, JSON or CBOR twin.")],
+    *,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", metavar="DIR", help="Draw the inertia margin against the delay into this folder."),
+    ] = None,
+    json: JsonOption = False,
+) -> int:
+    """Prove that the frozen loop is stable in every posture, with every payload, with up to half a sample of delay.
+
+    Exit code 1 if that is not proved. The gate reads nothing but the artifact and shares no code with the design.
+
+    \b
+    Example:
+      design robust out/arm3/artifact.json -o out/arm3
+    """
+    gate = robust_gate(read_artifact(artifact).content(), str(artifact))
+    if json:
+        print_json(gate.to_document())
+    else:
+        print_table(str(artifact), ("", ""), _rows(gate), left_columns=2)
+        print(_verdict(gate))
+    if out is not None:
+        for path in save(_figure(gate), out / FIGURE_NAME):
+            print_note(f"wrote {path}")
+    return 0 if gate.passed else 1
+
+
+def _figure(gate: RobustGate) -> Figure:
+    """The margin from no delay to well beyond the delay margin."""
+    longest = max(SHORTEST_CURVE_SAMPLES, gate.specified_delay_samples * 2)
+    if gate.delays is not None and gate.delays.proved is not None:
+        longest = max(longest, gate.delays.proved * BEYOND_THE_MARGIN)
+    return margin_figure(gate, margin_curve(gate.loop, longest))
+
+
+def _rows(gate: RobustGate) -> list[tuple[str, str]]:
+    """What a person wants to know, one line each."""
+    margin = _interval(*gate.margin.to_floats()) if gate.margin else "none"
+    needed = _interval(*gate.needed.to_floats()) if gate.needed else "none"
+    rows = [
+        (f"inertia margin with {to_float(gate.specified_delay_samples):g} samples of delay", margin),
+        ("needed range of M_t/M_n", needed),
+        ("delay margin", _delay(gate)),
+    ]
+    if gate.worst is not None:
+        place = gate.worst.place
+        angles = ", ".join(f"{angle:.3g}" for angle in place.angle_rad)
+        rows += [
+            ("worst growth rate (numerical)", f"{gate.worst.growth_rate_per_s:.3g} 1/s"),
+            ("  at joint angles", f"{angles} rad"),
+            ("  with payload fraction", f"{place.payload_fraction:.3g} (M_t/M_n {place.inertia_ratio:.4g})"),
+            ("  and a delay of", f"{gate.worst.delay_s * 1e3:.3g} ms"),
+        ]
+    return rows
+
+
+def _interval(low: float, high: float | None) -> str:
+    return f"[{low:.4g}, {'infinity' if high is None else f'{high:.4g}'}]"
+
+
+def _delay(gate: RobustGate) -> str:
+    if gate.delay_margin_s is None:
+        return "none"
+    return f"{gate.delay_margin_s * 1e3:.4g} ms = {gate.delay_margin_s / gate.loop.sample_period_s:.3g} samples"
+
+
+def _verdict(gate: RobustGate) -> str:
+    if gate.passed:
+        return "passed: proved for every posture, payload and constant delay up to the specified one (frozen loop)"
+    if gate.margin is None:
+        return "NOT passed: with the specified delay the loop is not stable even with the design inertia"
+    if gate.needed is None:
+        return "NOT passed: no range of inertia ratios could be proved over the operating domain"
+    return "NOT passed: the needed range does not lie inside the inertia margin up to the specified delay"
