@@ -1,7 +1,6 @@
 // What the laws share: fixed-size vectors, the design model at one sample, the reference guard, the integral.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <stdexcept>
 
 #include "quasilpv/control_law.hpp"
+#include "small_solvers.hpp"
 
 namespace quasilpv {
 
@@ -36,11 +36,7 @@ struct ModelSample {
 
   /// M_n^-1 torque; NaN if M_n is not positive definite at this measurement.
   JointVector<N> acceleration(const JointVector<N>& torque) const noexcept {
-    const Eigen::LLT<JointMatrix<N>> factor(inertia);
-    if (factor.info() != Eigen::Success) {
-      return JointVector<N>::Constant(std::numeric_limits<double>::quiet_NaN());
-    }
-    return factor.solve(torque);
+    return solve_positive_definite<N>(inertia, torque);
   }
 };
 
