@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <exception>
+#include <utility>
 
 #include "bindings.hpp"
 #include "quasilpv/errors.hpp"
@@ -14,7 +15,7 @@ py::object python_error(const char* name) { return py::module_::import("quasilpv
 /// Turns the exceptions of the C++ library into those of quasilpv.errors, with the same one-line message.
 void translate(std::exception_ptr pointer) {
   try {
-    std::rethrow_exception(pointer);
+    std::rethrow_exception(std::move(pointer));
   } catch (const InputError& error) {
     const py::object type = python_error("InputError");
     py::set_error(type, type(error.source(), error.field(), error.got(), error.expected()));
