@@ -10,12 +10,14 @@ import pytest
 
 from quasilpv import _runtime
 from quasilpv.errors import InputError
+from quasilpv.polytopes import BlockPolytope
 from reference.random_arms import SAMPLE_PERIOD_S, artifact_bytes, random_arm
 from reference.serial_arm import SerialArm
 from reference.step import (
     Answer,
     ComputedTorque,
     DobAcceleration,
+    DobTorque,
     FloatArray,
     OutputStage,
     Pid,
@@ -27,7 +29,7 @@ RELATIVE_TOLERANCE = 1e-12  # of the largest summand: observer gains make single
 RUNS, STEPS_PER_RUN = 200, 5
 FILTER_S = 2e-3
 
-Reference = DobAcceleration | Pid | ComputedTorque
+Reference = DobAcceleration | DobTorque | Pid | ComputedTorque
 Builder = Callable[[SerialArm, np.random.Generator, OutputStage], tuple[dict[str, Any], Callable[[], Reference]]]
 
 
@@ -102,9 +104,40 @@ def computed_torque(bandwidth: float) -> Builder:
     return build
 
 
+def dob_torque(
+    arm: SerialArm, rng: np.random.Generator, output: OutputStage
+) -> tuple[dict[str, Any], Callable[[], Reference]]:
+    n = len(arm.links)
+    count = n * (n - 1) // 2
+    polytope = BlockPolytope.per_premise([-1.0] * count, [1.0] * count)
+    near_one = np.eye(n) + 0.1 * rng.normal(size=(count + 1, n, n))
+    feedback = np.concatenate([-gain * near_one for gain in (5e3, 150.0, 6e4)], axis=2)
+    observer = np.concatenate([gain * near_one for gain in (2.4e3, 2e6, 8e8, 1e11)], axis=1)
+
+    def table(affine: FloatArray) -> dict[str, Any]:
+        return polytope.to_document(polytope.vertices(affine[0], affine[1:]))
+
+    def at(affine: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        def value(y: FloatArray) -> FloatArray:
+            alpha = np.cumsum(y)
+            z = [np.cos(alpha[k + gap] - alpha[k]) for gap in range(1, n) for k in range(n - gap)]
+            return np.asarray(affine[0] + np.tensordot(z, affine[1:], axes=1))
+
+        return value
+
+    law = {
+        "kind": "dob-torque",
+        "feedback": table(feedback),
+        "observer": table(observer),
+        "filter_time_constant_s": 1e-3,
+    }
+    return law, lambda: DobTorque(at(feedback), at(observer), 1e-3, arm.mass_matrix, arm.gravity_torque, fresh(output))
+
+
 LAWS: dict[str, Builder] = {
     "dob-acceleration": dob_acceleration(compensate=True),
     "dob-acceleration without compensation": dob_acceleration(compensate=False),
+    "dob-torque": dob_torque,
     "pid": pid,
     "ctc": computed_torque(0.0),
     "ctc-dob": computed_torque(200.0),

@@ -105,6 +105,23 @@ DobAccelerationParameters parse_dob_acceleration(const Field& law, const Field& 
   return parameters;
 }
 
+BlockPolytope parse_gains(const Field& field, const BlockPolytope& inertia, int rows, int columns) {
+  BlockPolytope gains = BlockPolytope::parse(field, rows, columns);
+  if (!gains.is_scheduled_like(inertia)) {
+    field.fail("another box, centre or partition of the premises", "that of law.inertia");
+  }
+  return gains;
+}
+
+DobTorqueParameters parse_dob_torque(const Field& law, const Field& programs, int joints) {
+  programs.only({"premises", "gravity"});
+  law.only({"kind", "feedback", "observer", "filter_time_constant_s", "inertia"});
+  DesignModel model = parse_model(law, programs, joints);
+  BlockPolytope feedback = parse_gains(law["feedback"], model.inertia, joints, 3 * joints);
+  BlockPolytope observer = parse_gains(law["observer"], model.inertia, 4 * joints, joints);
+  return {std::move(model), std::move(feedback), std::move(observer), law["filter_time_constant_s"].positive()};
+}
+
 PidParameters parse_pid(const Field& law, const Field& programs, int joints) {
   programs.only({"premises", "gravity", "coriolis_reference"});
   law.only({"kind", "kp", "kd", "ki", "velocity_filter_time_constant_s", "inertia"});
@@ -190,12 +207,14 @@ void Artifact::parse_law(const Field& law, const Field& programs) {
   law_kind_ = law["kind"].text();
   if (law_kind_ == "dob-acceleration") {
     law_ = parse_dob_acceleration(law, programs, joints_);
+  } else if (law_kind_ == "dob-torque") {
+    law_ = parse_dob_torque(law, programs, joints_);
   } else if (law_kind_ == "pid") {
     law_ = parse_pid(law, programs, joints_);
   } else if (law_kind_ == "ctc" || law_kind_ == "ctc-dob") {
     law_ = parse_computed_torque(law, programs, joints_);
   } else {
-    law["kind"].fail(Json(law_kind_).dump(), "dob-acceleration, pid, ctc or ctc-dob");
+    law["kind"].fail(Json(law_kind_).dump(), "dob-acceleration, dob-torque, pid, ctc or ctc-dob");
   }
 }
 

@@ -97,6 +97,12 @@ void BlockPolytope::parse_blocks(const Field& field, int rows, int columns) {
   }
 }
 
+bool BlockPolytope::is_scheduled_like(const BlockPolytope& other) const {
+  const auto same_premises = [](const Block& mine, const Block& theirs) { return mine.premises == theirs.premises; };
+  return lower_ == other.lower_ && upper_ == other.upper_ && centre_ == other.centre_ &&
+         std::equal(blocks_.begin(), blocks_.end(), other.blocks_.begin(), other.blocks_.end(), same_premises);
+}
+
 // The vertices are the source of truth: the collapsed form is compared with their weighted sum at each of them, which
 // is the point of the box where the premise of the block sits at a bound and the others at the centre.
 void BlockPolytope::collapse(const Field& field) {

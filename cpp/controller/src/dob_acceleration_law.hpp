@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "law_support.hpp"
+#include "observer_state.hpp"
 
 namespace quasilpv {
 
@@ -50,9 +50,8 @@ class DobAccelerationLaw final : public ControlLaw {
     }
     const JointVector<N> y = valid ? measured : state_.angle;
     const ModelSample<N> model = sample_model<N>(parameters_.model, y, report);
-    state_.filtered_disturbance =
-        filter_pole_ * state_.filtered_disturbance + (1.0 - filter_pole_) * state_.disturbance;
-    report_state(report);
+    state_.filter(filter_pole_);
+    state_.write_to(report);
 
     const JointVector<N> acceleration = commanded_acceleration(reference);
     to_array<N>(model.inertia * acceleration + model.gravity, report.torque_commanded);
@@ -72,23 +71,8 @@ class DobAccelerationLaw final : public ControlLaw {
   }
 
  private:
-  struct State {
-    JointVector<N> angle;
-    JointVector<N> speed;
-    JointVector<N> disturbance;
-    JointVector<N> disturbance_rate;
-    JointVector<N> filtered_disturbance;
-    JointVector<N> integral_error;
-
-    bool is_finite() const noexcept {
-      return angle.allFinite() && speed.allFinite() && disturbance.allFinite() && disturbance_rate.allFinite() &&
-             filtered_disturbance.allFinite() && integral_error.allFinite();
-    }
-  };
-
   void start(const JointVector<N>& measured) noexcept {
-    const JointVector<N> zero = JointVector<N>::Zero();
-    state_ = {measured, zero, zero, zero, zero, zero};
+    state_ = ObserverState<N>::at_rest(measured);
     reference_.reset(measured);
     started_ = true;
   }
@@ -121,19 +105,8 @@ class DobAccelerationLaw final : public ControlLaw {
       report.flags |= kModelInvalid;
     }
     applied += state_.disturbance;
-    const double t = sample_period_s_;
-    state_.angle += t * state_.speed + t * t / 2.0 * applied + t * t * t / 6.0 * state_.disturbance_rate;
-    state_.speed += t * applied + t * t / 2.0 * state_.disturbance_rate;
-    state_.disturbance += t * state_.disturbance_rate;
+    state_.advance(sample_period_s_, applied, state_.disturbance_rate);
     started_ = state_.is_finite();
-  }
-
-  void report_state(StepReport& report) const noexcept {
-    to_array<N>(state_.angle, report.estimated_angle);
-    to_array<N>(state_.speed, report.estimated_speed);
-    to_array<N>(state_.disturbance, report.estimated_disturbance);
-    to_array<N>(state_.filtered_disturbance, report.filtered_disturbance);
-    to_array<N>(state_.integral_error, report.integral_error);
   }
 
   DobAccelerationParameters parameters_;
@@ -141,7 +114,7 @@ class DobAccelerationLaw final : public ControlLaw {
   double filter_pole_;
   Limiter limiter_;
   ReferenceGuard<N> reference_;
-  State state_;
+  ObserverState<N> state_;
   bool started_ = false;
 };
 

@@ -114,6 +114,53 @@ class DobAcceleration:
 
 
 @dataclass
+class DobTorque:
+    """Scheduled feedback K = [Kp Kd KI], scheduled observer L and exact prediction, in torque coordinates.
+
+    The correction is the linear equation it solves, x - x_hat = T L (y - C x); the prediction is the exponential of the
+    nilpotent chain th' = w, w' = M^-1 (gamma - G + d), d' = dd.
+    """
+
+    feedback: Model
+    observer: Model
+    T_f: float
+    inertia: Model
+    gravity: Model
+    output: OutputStage
+    x: FloatArray | None = None
+    d_f: FloatArray | None = None
+    integral: FloatArray | None = None
+
+    def step(self, s: Sample) -> Answer:
+        T, y, n = self.output.T, s.angle, s.angle.size
+        zero = np.zeros(n)
+        x = np.concatenate([y, zero, zero, zero]) if self.x is None else self.x
+        d_f, e_I = (zero if held is None else held for held in (self.d_f, self.integral))
+        M, G, K, L = self.inertia(y), self.gravity(y), self.feedback(y), self.observer(y)
+        implicit = np.eye(4 * n)
+        implicit[:, :n] += T * L
+        correction = np.linalg.solve(implicit, T * L @ (y - x[:n]))
+        x = x + correction
+        q = np.exp(-T / self.T_f)
+        d_f = q * d_f + (1.0 - q) * x[2 * n : 3 * n]
+        error = np.concatenate([x[:n] - s.reference_angle, x[n : 2 * n] - s.reference_speed, e_I])
+        terms = (M @ s.reference_acceleration, -d_f, K @ error, G)
+        commanded = np.asarray(sum(terms))
+        applied = self.output.apply(commanded)
+        estimate = x[2 * n : 3 * n].copy()
+        self.integral = integrate(e_I, y - s.reference_angle, np.diag(K[:, 2 * n :]), T, commanded - applied)
+        A = np.zeros((4 * n, 4 * n))
+        A[:n, n : 2 * n] = A[2 * n : 3 * n, 3 * n :] = np.eye(n)
+        A[n : 2 * n, 2 * n : 3 * n] = mobility = np.linalg.inv(M)
+        x = x + T * A @ x + T**2 / 2 * A @ A @ x + T**3 / 6 * A @ A @ A @ x
+        x[:n] += T**2 / 2 * mobility @ (applied - G)
+        x[n : 2 * n] += T * mobility @ (applied - G)
+        self.x, self.d_f = x, d_f
+        summands = (*(np.abs(term) for term in terms), np.abs(K) @ np.abs(error), np.abs(correction))
+        return Answer(commanded, applied, estimate, summands)
+
+
+@dataclass
 class SpeedFilter:
     """Low-pass filter of the measured speed from the first sample on: w <- q w + (1 - q) w_y, q = exp(-T/T_f)."""
 

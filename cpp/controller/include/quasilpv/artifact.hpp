@@ -33,6 +33,14 @@ struct DobAccelerationParameters {
   bool disturbance_compensation = true;  ///< false: observed and predicted, but not subtracted
 };
 
+/// Kind `dob-torque`: gains scheduled on the premises of the inertia. Errors are x - x_r.
+struct DobTorqueParameters {
+  DesignModel model;
+  BlockPolytope feedback;               ///< [Kp Kd KI], n x 3n: N m/rad, N m s/rad, N m/(rad s)
+  BlockPolytope observer;               ///< [L1; L2; L3; L4], 4n x n: 1/s, 1/s^2, N m/(rad s), N m/(rad s^2)
+  double filter_time_constant_s = 0.0;  ///< of the disturbance filter, > 0
+};
+
 /// Kind `pid`: gains in N m/rad, N m s/rad, N m/(rad s), acting on r - y.
 struct PidParameters {
   DesignModel model;
@@ -54,7 +62,8 @@ struct ComputedTorqueParameters {
   double disturbance_observer_bandwidth_rad_s = 0.0;  ///< 0: kind `ctc`
 };
 
-using LawParameters = std::variant<DobAccelerationParameters, PidParameters, ComputedTorqueParameters>;
+using LawParameters =
+    std::variant<DobAccelerationParameters, DobTorqueParameters, PidParameters, ComputedTorqueParameters>;
 
 /// Interval of one joint.
 struct Interval {

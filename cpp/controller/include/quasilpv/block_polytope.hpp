@@ -34,6 +34,8 @@ class BlockPolytope {
 
   int premises() const noexcept { return static_cast<int>(centre_.size()); }
   int vertices() const noexcept { return static_cast<int>(vertices_.size()); }
+  /// Whether the other has the same box, centre and partition, so that one premise vector has the same weights in both.
+  bool is_scheduled_like(const BlockPolytope& other) const;
   /// Whether the collapsed form is in use.
   bool is_affine() const noexcept { return is_affine_; }
   /// X at the centre of the box. INIT-ONLY.

@@ -120,6 +120,17 @@ class PolytopeTable(StrictModel):
             matrix += np.tensordot(weights, np.array(block.vertices), axes=1) / len(self.blocks)
         return matrix
 
+    def require_gains(self, field: str, rows: int, columns: int, inertia: PolytopeTable) -> None:
+        """Raise ``FieldError`` unless vertices are ``rows`` x ``columns``, scheduled on the premises of the inertia."""
+        for path, vertex in self._vertices():
+            if (len(vertex), len(vertex[0])) != (rows, columns):
+                raise FieldError(f"{field}.{path}", f"{len(vertex)} x {len(vertex[0])}", f"{rows} x {columns}")
+        if self._schedule() != inertia._schedule():
+            raise FieldError(field, "another box, centre or partition of the premises", "that of law.inertia")
+
+    def _schedule(self) -> tuple[object, ...]:
+        return self.lower, self.upper, self.centre, tuple(block.premises for block in self.blocks)
+
     def require_inertia(self, field: str, size: int) -> None:
         """Raise ``FieldError`` unless vertices are symmetric ``size`` x ``size`` and the centre is positive definite.
 
@@ -159,6 +170,19 @@ class DobAccelerationLaw(StrictModel):
     observer: tuple[float, float, float, float]
     filter_time_constant_s: Positive
     disturbance_compensation: bool
+    inertia: PolytopeTable
+
+
+class DobTorqueLaw(StrictModel):
+    """Tracking in torque coordinates with a disturbance observer and scheduled gains (Dehak 2022, Theorem IV.11).
+
+    ``feedback`` holds [Kp Kd KI], n x 3n, acting on x - x_r; ``observer`` holds [L1; L2; L3; L4], 4n x n.
+    """
+
+    kind: Literal["dob-torque"]
+    feedback: PolytopeTable
+    observer: PolytopeTable
+    filter_time_constant_s: Positive
     inertia: PolytopeTable
 
 
@@ -207,10 +231,11 @@ class CtcDobLaw(_ComputedTorque):
         return self
 
 
-Law = Annotated[DobAccelerationLaw | PidLaw | CtcLaw | CtcDobLaw, Field(discriminator="kind")]
+Law = Annotated[DobAccelerationLaw | DobTorqueLaw | PidLaw | CtcLaw | CtcDobLaw, Field(discriminator="kind")]
 
 GAIN_FIELDS: Mapping[str, tuple[str, ...]] = {
     "dob-acceleration": (),
+    "dob-torque": (),
     "pid": ("kp", "kd", "ki"),
     "ctc": ("gp", "gd", "gi"),
     "ctc-dob": ("gp", "gd", "gi"),
@@ -225,6 +250,7 @@ PROGRAM_INPUTS: Mapping[str, tuple[str, ...]] = {
 
 REQUIRED_PROGRAMS: Mapping[str, tuple[str, ...]] = {
     "dob-acceleration": ("premises", "gravity"),
+    "dob-torque": ("premises", "gravity"),
     "pid": ("premises", "gravity", "coriolis_reference"),
     "ctc": ("premises", "gravity", "coriolis"),
     "ctc-dob": ("premises", "gravity", "coriolis"),
@@ -286,6 +312,9 @@ class Artifact(StrictModel):
         for member in GAIN_FIELDS[self.law.kind]:
             require_size(f"law.{member}", getattr(self.law, member), n)
         self.law.inertia.require_inertia("law.inertia", n)
+        if isinstance(self.law, DobTorqueLaw):
+            self.law.feedback.require_gains("law.feedback", n, 3 * n, self.law.inertia)
+            self.law.observer.require_gains("law.observer", 4 * n, n, self.law.inertia)
         self._check_programs()
         return self
 
