@@ -109,7 +109,8 @@ def test_when_computed_torque_is_written_expect_the_printed_gains() -> None:
     assert np.allclose(law.gi, 1.0465e5, rtol=5e-5)
 
 
-@pytest.mark.parametrize("controller", CONTROLLERS)
+# dob-torque has the programs of dob-acceleration and takes long to design.
+@pytest.mark.parametrize("controller", [name for name in CONTROLLERS if name != "dob-torque"])
 @pytest.mark.parametrize("robot_id", ["arm2", "arm3"])
 def test_when_programs_are_compiled_expect_the_model_they_came_from(robot_id: str, controller: str) -> None:
     model = robot(robot_id).model

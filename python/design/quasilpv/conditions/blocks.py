@@ -1,10 +1,15 @@
-"""Inequalities that several discrete-time conditions share."""
+"""Inequalities and relaxations that several conditions share."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 
-from quasilpv.lmi import Expression, block
+import numpy as np
+import numpy.typing as npt
+
+from quasilpv.lmi import Expression, Problem, Variable, block, zeros
+from quasilpv.lmi.exact import Matrix
 from quasilpv.lmi.expressions import Operand, as_expression
 
 
@@ -23,3 +28,63 @@ def pole_disk(lyapunov: Operand, product: Operand, centre: Fraction, radius: Fra
     matrix = as_expression(lyapunov)
     shifted = as_expression(product) - matrix * centre
     return block([[matrix * radius, None], [shifted, matrix * radius]])
+
+
+def identity_blocks(size: int) -> tuple[Matrix, Matrix]:
+    """The exact identity and zero matrices of one size, the bricks of constant matrices."""
+    return np.eye(size, dtype=int).astype(object), np.zeros((size, size), dtype=int).astype(object)
+
+
+def block_diagonal(*blocks: Matrix) -> Matrix:
+    """Constant block-diagonal matrix; exact when the blocks are."""
+    grid: list[list[Operand | None]] = [
+        [across if i == j else zeros(len(down), across.shape[1]) for j, across in enumerate(blocks)]
+        for i, down in enumerate(blocks)
+    ]
+    return block(grid).constant
+
+
+def single_sum(problem: Problem, name: str, entry: Callable[[int], Expression], count: int) -> None:
+    """Require ``sum_i w_i X_i < 0`` for all convex weights: ``X_i < 0``."""
+    for i in range(count):
+        problem.negative(f"{name} {i}", entry(i))
+
+
+def double_sum(
+    problem: Problem,
+    name: str,
+    entry: Callable[[int, int], Expression],
+    count: int,
+    slack_blocks: npt.NDArray[np.intp] | None = None,
+) -> None:
+    """Require ``sum_ij w_i w_j X_ij < 0`` for all convex weights (Tuan et al. 2001, Theorem 2.2).
+
+    ``X_ii < 0`` and ``2/(N-1) X_ii + X_ij + X_ji < 0`` for all ordered i != j; N vertices. With slack matrices
+    ``T_k, S_k``, one pair per block k of a block polytope, X_ij is replaced by ``X_ij + T_k(i) + S_k(j) - mean``: the
+    weights of a block sum to 1/G, so the addition has mean zero (Dehak 2022, Lemma II.1).
+
+    Args:
+        problem: receives the inequalities, named ``"<name> i j"``.
+        name: of the family.
+        entry: X_ij; only its symmetric part matters.
+        count: N.
+        slack_blocks: block of every vertex, or None for no slack (a single block has none: T - mean = 0).
+    """
+    grid = [[entry(i, j) for j in range(count)] for i in range(count)]
+    if slack_blocks is not None and len(set(slack_blocks)) > 1:
+        slack = _slack(name, slack_blocks, grid[0][0].shape[0])
+        grid = [[grid[i][j] + slack[i][j] for j in range(count)] for i in range(count)]
+    for i in range(count):
+        problem.negative(f"{name} {i} {i}", grid[i][i])
+        for j in range(count):
+            if i != j:
+                problem.negative(f"{name} {i} {j}", grid[i][i] * Fraction(2, count - 1) + grid[i][j] + grid[j][i])
+
+
+def _slack(name: str, blocks: npt.NDArray[np.intp], size: int) -> list[list[Expression]]:
+    """``T_k(i) + S_k(j) - (1/G) sum_k (T_k + S_k)`` for all i, j."""
+    groups = sorted(set(blocks.tolist()))
+    T, S = ({k: Variable(f"{letter}{k} {name}", size, symmetric=True).expression for k in groups} for letter in "TS")
+    mean = [(family[k]) * Fraction(-1, len(groups)) for family in (T, S) for k in groups]
+    shift = sum(mean[1:], mean[0])
+    return [[T[i] + S[j] + shift for j in blocks.tolist()] for i in blocks.tolist()]

@@ -14,10 +14,9 @@ Matrix: TypeAlias = npt.NDArray[Any]
 
 def to_rational(matrix: Any) -> Matrix:
     """Matrix of `fractions.Fraction`, each the exact value of its double (or integer, or rational) entry."""
-    array: Matrix = np.asarray(matrix, dtype=object)
-    if array.size == 0:
-        return array.copy()
-    return np.vectorize(lambda x: x if isinstance(x, Fraction) else Fraction(x), otypes=[object])(array)  # type: ignore[no-any-return]
+    exact: Matrix = np.empty(np.shape(matrix), dtype=object)
+    exact[...] = [[Fraction(entry) for entry in row] for row in np.asarray(matrix, dtype=object)]
+    return exact
 
 
 def symmetric_part(matrix: Matrix) -> Matrix:

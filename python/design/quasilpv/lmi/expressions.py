@@ -93,7 +93,8 @@ class Variable:
 
     def __mul__(self, factor: Any) -> Expression:
         """Product with a number, or of a 1 x 1 variable with a constant matrix."""
-        return self.expression * factor
+        product: Expression = self.expression * factor
+        return product
 
     __rmul__ = __mul__
 
@@ -175,7 +176,8 @@ class ScalarProduct:
 
     def at(self, value: Matrix) -> Matrix:
         """Value of the term at x = value."""
-        return self.coefficient * value[0, 0]
+        product: Matrix = self.coefficient * value[0, 0]
+        return product
 
     def add_to(self, total: Matrix, value: Matrix) -> None:
         """``total += x * coefficient`` entry by entry, for exact scalars."""

@@ -1,0 +1,71 @@
+"""The tracking law `dob-torque`, from robot and specification to a design with its witness."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from quasilpv.synthesis.acceleration_design import Progress, no_progress
+from quasilpv.synthesis.specification import Specification
+from quasilpv.synthesis.torque_design import TorqueDesign, design_torque_law
+from quasilpv.synthesis.tracking_design import TrackingDesign
+from quasilpv.systems.registry import Robot
+
+
+def torque_law(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
+    """Design `dob-torque`: Theorem IV.11 of Dehak 2022 in reduced form, with usable gains.
+
+    Args:
+        robot: what it is for.
+        specification: what is asked for.
+        progress: called with (points done, points in all).
+
+    Raises:
+        InfeasibleError: no design meets the specification.
+    """
+    design = design_torque_law(robot, specification, progress)
+    tables = design.law
+    return TrackingDesign(
+        controller="dob-torque",
+        robot=robot,
+        sample_period_s=specification.sample_period_s,
+        law={
+            "kind": "dob-torque",
+            "feedback": tables.polytope.to_document(tables.feedback),
+            "observer": tables.polytope.to_document(tables.observer),
+            "filter_time_constant_s": tables.filter_time_constant_s,
+            "inertia": tables.polytope.to_document(tables.inertia),
+        },
+        expressions={
+            "premises": tuple(premise.expression for premise in design.schedule.premises),
+            "gravity": tuple(robot.model.symbolic.gravity),
+        },
+        inputs={"controller": "dob-torque", "specification": specification.to_document()},
+        report=design.report(),
+        witness=_witness(design),
+    )
+
+
+def _witness(design: TorqueDesign) -> dict[str, Any]:
+    """The points of the two conditions, SI; inertia and gains are those of the law's own tables."""
+    feedback, observer = design.feedback, design.observer
+    return {
+        "feedback": {
+            "condition": "IV.11-reduced-feedback",
+            "decay_per_s": feedback.decay,
+            "disk_rad_s": feedback.disk,
+            "gamma": feedback.gamma,
+            "P": feedback.P.tolist(),
+        },
+        "observer": {
+            "condition": "IV.11-reduced-observer",
+            "decay_per_s": observer.decay,
+            "disk_rad_s": observer.disk,
+            "noise": observer.noise,
+            "gamma": observer.gamma,
+            "Q": observer.Q.tolist(),
+            "multipliers": {
+                "bounded_real": observer.multipliers["bounded real"][0].tolist(),
+                "pole_disk": observer.multipliers["pole disk"][0].tolist(),
+            },
+        },
+    }
