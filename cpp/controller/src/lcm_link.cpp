@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <ctime>
@@ -80,21 +81,62 @@ void require_multicast(const MulticastAddress& address, const std::string& url) 
 
 }  // namespace
 
-class LcmLink::Subscription {
+/// The LCM instance with its subscriptions; lcm.h stays out of the header.
+class LcmLink::Connection {
  public:
-  Subscription(LcmLink& link, Channel channel) : link_(link), channel_(channel) {}
+  Connection(LcmLink& link, const std::string& url) : link_(link), lcm_(lcm_create(url.c_str())) {
+    if (lcm_ == nullptr) {
+      throw TransportError("url '" + url + "': LCM could not be opened");
+    }
+  }
 
-  static void handle(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) {
-    const auto* subscription = static_cast<const Subscription*>(self);
-    subscription->link_.accept(subscription->channel_, received->data, received->data_size);
+  void subscribe(Channel channel) {
+    Listener& listener = listeners_[static_cast<std::size_t>(channel)];
+    listener = {&link_, channel};
+    lcm_subscription_t* subscription = lcm_subscribe(lcm_.get(), channel_name(channel), &Listener::handle, &listener);
+    if (subscription == nullptr) {
+      throw TransportError(std::string("channel ") + channel_name(channel) + ": LCM could not subscribe");
+    }
+    lcm_subscription_set_queue_capacity(subscription, kQueueCapacity);
+    file_descriptor_ = lcm_get_fileno(lcm_.get());
+  }
+
+  bool publish(Channel channel, const void* bytes, std::size_t size) noexcept {
+    return lcm_publish(lcm_.get(), channel_name(channel), bytes, static_cast<unsigned int>(size)) == 0;
+  }
+
+  bool drain(std::int64_t timeout_ns) noexcept {
+    // lcm_handle_timeout() counts in milliseconds, a sample in microseconds.
+    pollfd waited{file_descriptor_, POLLIN, 0};
+    const timespec timeout{timeout_ns / kNanosecondsPerSecond, timeout_ns % kNanosecondsPerSecond};
+    if (ppoll(&waited, 1, &timeout, nullptr) <= 0) {
+      return false;
+    }
+    for (int packet = 0; packet < kQueueCapacity && lcm_handle_timeout(lcm_.get(), 0) > 0; ++packet) {
+    }
+    return true;
   }
 
  private:
-  LcmLink& link_;
-  Channel channel_;
-};
+  struct Listener {
+    static void handle(const lcm_recv_buf_t* received, const char* /*channel*/, void* self) {
+      const auto* listener = static_cast<const Listener*>(self);
+      listener->link->accept(listener->channel, received->data, received->data_size);
+    }
 
-void LcmLink::Destroy::operator()(_lcm_t* lcm) const noexcept { lcm_destroy(lcm); }
+    LcmLink* link = nullptr;
+    Channel channel = Channel::kEvent;
+  };
+
+  struct Destroy {
+    void operator()(lcm_t* lcm) const noexcept { lcm_destroy(lcm); }
+  };
+
+  LcmLink& link_;
+  std::array<Listener, kChannels> listeners_{};
+  std::unique_ptr<lcm_t, Destroy> lcm_;
+  int file_descriptor_ = -1;
+};
 
 LcmLink::LcmLink(Side side, const WireIdentity& identity, const std::string& url, bool allow_network, Listen listen)
     : Link(side, identity) {
@@ -104,44 +146,19 @@ LcmLink::LcmLink(Side side, const WireIdentity& identity, const std::string& url
                      "ttl=0 (this machine only), or --allow-network: messages are not authenticated");
   }
   require_multicast(address, url);
-  lcm_.reset(lcm_create(url.c_str()));
-  if (lcm_ == nullptr) {
-    throw TransportError("url '" + url + "': LCM could not be opened");
-  }
+  connection_ = std::make_unique<Connection>(*this, url);
   if (listen == Listen::kPeer) {
-    subscribe(side == Side::kController ? Channel::kMeasurement : Channel::kCommand);
-    subscribe(Channel::kEvent);
-    file_descriptor_ = lcm_get_fileno(lcm_.get());
+    connection_->subscribe(side == Side::kController ? Channel::kMeasurement : Channel::kCommand);
+    connection_->subscribe(Channel::kEvent);
   }
 }
 
 LcmLink::~LcmLink() = default;
 
-void LcmLink::subscribe(Channel channel) {
-  auto& slot = subscriptions_[static_cast<std::size_t>(channel)];
-  slot = std::make_unique<Subscription>(*this, channel);
-  lcm_subscription_t* subscription =
-      lcm_subscribe(lcm_.get(), channel_name(channel), &Subscription::handle, slot.get());
-  if (subscription == nullptr) {
-    throw TransportError(std::string("channel ") + channel_name(channel) + ": LCM could not subscribe");
-  }
-  lcm_subscription_set_queue_capacity(subscription, kQueueCapacity);
-}
-
 bool LcmLink::transmit(Channel channel, const void* bytes, std::size_t size) noexcept {
-  return lcm_publish(lcm_.get(), channel_name(channel), bytes, static_cast<unsigned int>(size)) == 0;
+  return connection_->publish(channel, bytes, size);
 }
 
-bool LcmLink::drain(std::int64_t timeout_ns) noexcept {
-  // lcm_handle_timeout() counts in milliseconds, a sample in microseconds.
-  pollfd waited{file_descriptor_, POLLIN, 0};
-  const timespec timeout{timeout_ns / kNanosecondsPerSecond, timeout_ns % kNanosecondsPerSecond};
-  if (ppoll(&waited, 1, &timeout, nullptr) <= 0) {
-    return false;
-  }
-  for (int packet = 0; packet < kQueueCapacity && lcm_handle_timeout(lcm_.get(), 0) > 0; ++packet) {
-  }
-  return true;
-}
+bool LcmLink::drain(std::int64_t timeout_ns) noexcept { return connection_->drain(timeout_ns); }
 
 }  // namespace quasilpv

@@ -17,7 +17,9 @@ void flatten(const Json& value, const std::string& path, Rows& rows) {
     return;
   }
   for (const auto& [name, member] : value.items()) {
-    flatten(member, path.empty() ? name : path + "." + name, rows);
+    std::string member_path = path;
+    member_path.append(path.empty() ? "" : ".").append(name);
+    flatten(member, member_path, rows);
   }
 }
 

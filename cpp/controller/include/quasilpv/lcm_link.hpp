@@ -1,13 +1,10 @@
 // LCM over UDP multicast: the transport between two processes.
 #pragma once
 
-#include <array>
 #include <memory>
 #include <string>
 
 #include "quasilpv/link.hpp"
-
-struct _lcm_t;
 
 namespace quasilpv {
 
@@ -30,19 +27,12 @@ class LcmLink final : public Link {
   ~LcmLink() override;
 
  private:
-  class Subscription;
+  class Connection;
 
   bool transmit(Channel channel, const void* bytes, std::size_t size) noexcept override;
   bool drain(std::int64_t timeout_ns) noexcept override;
-  void subscribe(Channel channel);
 
-  struct Destroy {
-    void operator()(_lcm_t* lcm) const noexcept;
-  };
-
-  std::unique_ptr<_lcm_t, Destroy> lcm_;
-  std::array<std::unique_ptr<Subscription>, kChannels> subscriptions_;
-  int file_descriptor_ = -1;
+  std::unique_ptr<Connection> connection_;
 };
 
 }  // namespace quasilpv
