@@ -267,7 +267,7 @@ def _blossom(u: Any, v: Any, unit: Any = 1) -> list[list[Any]]:
 @cache
 def _signs(size: int) -> FloatArray:
     """All sign vectors of a size, one per row."""
-    return np.array(list(product((1.0, -1.0), repeat=size))).reshape(-1, size)
+    return np.array(list(product((1.0, -1.0), repeat=size))).reshape(2**size, size)
 
 
 def _weighted(weights: IntegerArray, matrices: IntegerArray) -> IntegerArray:

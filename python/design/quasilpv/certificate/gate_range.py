@@ -33,7 +33,7 @@ from quasilpv.errors import InputError
 
 Side: TypeAlias = Literal["lowest", "highest"]
 
-TOLERANCE = 0.001
+TOLERANCE = 0.002
 LOOSEST_TOLERANCE = 0.1
 SAMPLES = 3000
 SAMPLED_FRACTIONS = 9

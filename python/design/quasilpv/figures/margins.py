@@ -31,7 +31,7 @@ def margin_figure(gate: RobustGate, curve: MarginCurve) -> Figure:
         _plot_margin(axes, curve)
         if gate.needed is not None:
             low, high = gate.needed.to_floats()
-            axes.axhspan(low, high, color=ORANGE, alpha=0.35, linewidth=0, zorder=2, label="needed range (proved)")
+            axes.axhspan(low, high, color=ORANGE, alpha=0.35, linewidth=0, zorder=0.9, label="needed range (proved)")
         specified_ms = to_float(gate.specified_delay_samples) * 1e3 / rate
         axes.axvline(specified_ms, color=BLACK, linestyle=(0, (4, 2)), label="specified delay")
         if gate.delay_margin_s is not None:
