@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -108,9 +109,16 @@ def test_when_a_rational_is_printed_expect_the_neighbouring_doubles(value: Fract
 
 
 @settings(max_examples=40)
-@given(st.floats(20, 100), st.floats(300, 1500), st.floats(2e-4, 3e-3), delays, st.floats(0.2, 10), st.booleans())
+@given(
+    wc=st.floats(20, 100),
+    wo=st.floats(300, 1500),
+    filter_s=st.floats(2e-4, 3e-3),
+    delay=delays,
+    ratio=st.floats(0.2, 10),
+    compensated=st.booleans(),
+)
 def test_when_the_law_is_run_step_by_step_expect_the_exact_characteristic_polynomial(
-    wc: float, wo: float, filter_s: float, delay: fmpq, ratio: float, compensated: bool
+    *, wc: float, wo: float, filter_s: float, delay: fmpq, ratio: float, compensated: bool
 ) -> None:
     loop = replace(multiple_pole_loop(wc, wo, filter_s, 1e-3), disturbance_compensation=compensated)
     polynomial = CharacteristicPolynomial.of(Controller.of(loop, loop.filter_poles()[0]), delay)
@@ -146,7 +154,7 @@ def test_when_a_posture_is_random_expect_the_spectrum_of_all_joints_to_be_the_un
     for delay in (fmpq(0), fmpq(1, 2), fmpq(6, 5)):
         theta = rng.uniform(low, high)
         true = arm3.with_payload_fraction(float(rng.uniform())).inertia(theta)
-        coupling = np.linalg.solve(true, 1.3 * arm3.model.inertia(theta))
+        coupling = np.asarray(np.linalg.solve(true, 1.3 * arm3.model.inertia(theta)), dtype=np.float64)
         full = full_map(DEFAULT, coupling, to_float(delay))
         assert len(full) == 27 + 3 * int(delay.floor())
         polynomial = CharacteristicPolynomial.of(Controller.of(DEFAULT, DEFAULT.filter_poles()[0]), delay)
@@ -166,7 +174,7 @@ def test_when_growth_rates_are_printed_expect_those_of_the_map() -> None:
 @pytest.mark.parametrize(
     "change", [{"sample_period_s": 0.0}, {"kp": math.nan}, {"observer": (1.0, 1.0, math.inf, 1.0)}]
 )
-def test_when_the_law_is_no_law_expect_the_field_named(change: dict[str, object]) -> None:
+def test_when_the_law_is_no_law_expect_the_field_named(change: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=next(iter(change))):
         replace(DEFAULT, **change)
 
@@ -241,7 +249,7 @@ MUTANTS = [
 
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: next(iter(mutant)))
-def test_when_a_gain_is_wrong_expect_the_needed_range_outside_the_margin(mutant: dict[str, object]) -> None:
+def test_when_a_gain_is_wrong_expect_the_needed_range_outside_the_margin(mutant: dict[str, Any]) -> None:
     sound = inertia_margin(DEFAULT, fmpq(1, 2))
     assert sound is not None
     assert sound.contains(LOWEST, HIGHEST)
