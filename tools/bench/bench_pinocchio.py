@@ -38,7 +38,8 @@ def rnea_program(*, may_build: bool) -> Competitor:
         return Competitor(missing="the wheel `pin` with its C++ headers is not installed in this environment")
     if not may_build:
         return Competitor(program) if program.is_file() else Competitor(missing="not built in a quick run")
-    print("building the Pinocchio competitor in build/bench-pinocchio", file=sys.stderr)
+    if not program.is_file():
+        print("building the Pinocchio competitor in build/bench-pinocchio", file=sys.stderr)
     configure = ["cmake", "-S", str(SOURCE), "-B", str(BUILD), "-G", "Ninja", f"-DPINOCCHIO_PREFIX={prefix}"]
     for command in (configure, ["cmake", "--build", str(BUILD)]):
         done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -108,7 +108,7 @@ nlohmann::json measure_lcm(const std::string& url, std::int64_t samples) {
     _exit(0);
   }
   LcmLink plant(Side::kPlant, wire, url, false);
-  const nlohmann::json report = ask(plant, samples);
+  nlohmann::json report = ask(plant, samples);
   waitpid(child, nullptr, 0);
   return report;
 }
