@@ -21,8 +21,15 @@ def clean_environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An environment that holds the wheel and what its metadata asks for, nothing else."""
     folder = tmp_path_factory.mktemp("packaging")
     run(
-        *(sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", folder),
-        *(f"--config-settings=build-dir={folder / 'build'}", ROOT),
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--no-build-isolation",
+        "--no-deps",
+        "--wheel-dir",
+        folder,
+        ROOT,
         cwd=folder,
     )
     [wheel] = folder.glob("quasilpv-*.whl")
