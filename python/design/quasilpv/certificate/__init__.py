@@ -12,12 +12,14 @@ from typing import Any
 
 from quasilpv.certificate.claims import Claim, Verification
 from quasilpv.certificate.sampled_chains import check_dob_acceleration
+from quasilpv.certificate.torque_law import check_dob_torque
 from quasilpv.errors import InputError
 
 __all__ = ["CHECKERS", "Claim", "Verification", "verify"]
 
 CHECKERS: Mapping[str, Callable[[Mapping[str, Any]], tuple[Claim, ...]]] = {
     "dob-acceleration": check_dob_acceleration,
+    "dob-torque": check_dob_torque,
 }
 """How each law kind is checked; kinds without an entry make no claim."""
 

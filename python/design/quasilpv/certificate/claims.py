@@ -6,19 +6,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from flint import fmpq_mat
+from flint import fmpq, fmpq_mat
 
-from quasilpv.certificate.exact_matrices import is_positive_definite
+from quasilpv.certificate.exact_matrices import is_positive_definite, scaled_to_unit_diagonal
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One matrix inequality ``matrix > 0``, decided exactly.
+    """One inequality, decided exactly.
 
     Attributes:
         name: which inequality, e.g. ``"observer: pole disk"``.
         holds: the exact verdict.
-        margin: smallest eigenvalue over the largest, in double arithmetic: how far from the edge, for people.
+        margin: smallest eigenvalue once rows and columns are scaled to a unit diagonal, in double arithmetic and at
+            least -1: how far from the edge, for people, whatever the units.
     """
 
     name: str
@@ -28,10 +29,20 @@ class Claim:
     @classmethod
     def positive(cls, name: str, exact: fmpq_mat) -> Claim:
         """Decide ``exact > 0``."""
-        values = np.array([[int(entry.p) / int(entry.q) for entry in row] for row in exact.table()])
-        spectrum = np.linalg.eigvalsh((values + values.T) / 2.0)
-        largest = max(abs(spectrum[0]), abs(spectrum[-1]), np.finfo(float).tiny)
-        return cls(name, is_positive_definite(exact), float(spectrum[0] / largest))
+        return cls(name, is_positive_definite(exact), _margin(exact))
+
+
+def _margin(exact: fmpq_mat) -> float:
+    """Smallest eigenvalue at unit diagonal; -1 if a diagonal entry is not positive."""
+    if any(exact[k, k] <= 0 for k in range(exact.nrows())):
+        return -1.0
+    # In a positive definite matrix of this scaling no entry exceeds 2: larger ones need not be told apart.
+    low, high = fmpq(-4), fmpq(4)
+    bounded = [[min(max(entry, low), high) for entry in row] for row in scaled_to_unit_diagonal(exact).table()]
+    values = np.array([[int(entry.p) / int(entry.q) for entry in row] for row in bounded])
+    unit = 1.0 / np.sqrt(values.diagonal())
+    values = (values + values.T) / 2.0 * np.outer(unit, unit)
+    return max(-1.0, float(np.linalg.eigvalsh(values)[0]))
 
 
 @dataclass(frozen=True)
@@ -51,12 +62,20 @@ class Verification:
         """Smallest margin over all claims; NaN without claims."""
         return min((claim.margin for claim in self.claims), default=float("nan"))
 
-    def to_document(self) -> dict[str, Any]:
-        """JSON-able summary: verified, lmis, worst_margin, seconds, and the claims that fail."""
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Names of the claims that do not hold."""
+        return tuple(claim.name for claim in self.claims if not claim.holds)
+
+    def findings(self) -> dict[str, Any]:
+        """JSON-able, the same at every run: verified, lmis, worst_margin, and the claims that fail."""
         return {
             "verified": self.verified,
             "lmis": len(self.claims),
             "worst_margin": self.worst_margin,
-            "seconds": self.seconds,
-            "failed": [claim.name for claim in self.claims if not claim.holds],
+            "failed": list(self.failed),
         }
+
+    def to_document(self) -> dict[str, Any]:
+        """The findings, and how many seconds they took."""
+        return {**self.findings(), "seconds": self.seconds}

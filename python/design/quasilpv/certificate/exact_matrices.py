@@ -76,22 +76,39 @@ def is_symmetric(square: fmpq_mat) -> bool:
     return bool(square == square.transpose())
 
 
-def is_positive_definite(square: fmpq_mat) -> bool:
-    """Whether a symmetric matrix is positive definite: all pivots of its exact L D L' factorisation are positive.
+def scaled_to_unit_diagonal(square: fmpq_mat) -> fmpq_mat:
+    """``S M S`` with S a diagonal of powers of two that brings every positive diagonal entry into [1/2, 2).
 
+    A congruence, so it changes no sign of an eigenvalue; it takes units out of the numbers and keeps them short.
+    """
+    size = square.nrows()
+    scale = fmpq_mat(size, size)
+    for k in range(size):
+        entry = square[k, k]
+        exponent = int(entry.p).bit_length() - int(entry.q).bit_length() if entry > 0 else 0
+        scale[k, k] = rational(Fraction(2) ** -(exponent // 2))
+    return scale * square * scale
+
+
+def is_positive_definite(square: fmpq_mat) -> bool:
+    """Whether a symmetric matrix is positive definite: all its leading principal minors are positive (Sylvester).
+
+    The minors of an integer multiple, by fraction-free elimination (Bareiss 1968):
+    ``m_ij <- (d_k m_ij - m_ik m_kj) / d_(k-1)`` leaves no remainder, and its pivots d_k are the leading minors.
     A matrix that is not symmetric is not positive definite here.
     """
     if not is_symmetric(square):
         return False
-    work = square.table()
+    numerators, _ = scaled_to_unit_diagonal(square).numer_denom()
+    work = [[int(entry) for entry in row] for row in numerators.table()]
     size = len(work)
+    previous = 1
     for k in range(size):
         pivot = work[k][k]
         if pivot <= 0:
             return False
         for i in range(k + 1, size):
-            factor = work[i][k] / pivot
-            if factor != 0:
-                for j in range(k + 1, size):
-                    work[i][j] = work[i][j] - factor * work[k][j]
+            for j in range(i, size):
+                work[i][j] = (pivot * work[i][j] - work[k][i] * work[k][j]) // previous
+        previous = pivot
     return True
