@@ -1,6 +1,7 @@
-"""From a design to the artifact that is shipped: programs compiled, evidence attached, one object.
+"""From a design to the artifact that is shipped: programs compiled, claims checked, evidence attached, one object.
 
-The only room that knows both how a law is designed and how an artifact is written.
+The only room that knows both how a law is designed and how an artifact is written. Nothing leaves it whose claims do
+not hold in exact arithmetic or that fails its robust gate, unless that is asked for; then the artifact says so.
 """
 
 from __future__ import annotations
@@ -10,10 +11,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
+from flint import fmpq
 
 from quasilpv import __version__
 from quasilpv.artifact import Artifact, Program, compile_program
 from quasilpv.artifact.canonical import document_hash
+from quasilpv.certificate import CHECKERS, verify
+from quasilpv.certificate.gate import robust_gate
+from quasilpv.errors import ClaimError
 from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, TrackingDesign, synthesise
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.baselines import reference_speeds
@@ -25,7 +30,7 @@ class Release:
     """An artifact and the numbers behind it.
 
     Attributes:
-        artifact: what the run-time side loads.
+        artifact: what the run-time side loads; its `verification` holds the evidence.
         report: numbers for people, JSON-able (empty for baselines).
     """
 
@@ -39,20 +44,23 @@ def release(
     specification: Specification | None = None,
     *,
     disturbance_compensation: bool = True,
+    allow_unverified: bool = False,
     progress: Progress = no_progress,
 ) -> Release:
-    """Design a controller and put it into an artifact.
+    """Design a controller, check what it claims, and put it into an artifact.
 
     Args:
         robot_id: name in the registry of robots.
         controller: one of `quasilpv.synthesis.CONTROLLERS`.
         specification: what is asked for.
         disturbance_compensation: of `dob-acceleration`.
+        allow_unverified: release a design whose claims do not hold or that fails its gate, marked as such.
         progress: called with (points done, points in all).
 
     Raises:
         InputError: unknown robot or controller.
         InfeasibleError: no design meets the specification.
+        ClaimError: a claim does not hold, or the robust gate is not passed.
     """
     design = synthesise(
         robot(robot_id),
@@ -61,7 +69,55 @@ def release(
         disturbance_compensation=disturbance_compensation,
         progress=progress,
     )
-    return Release(to_artifact(design), design.report)
+    return Release(checked_artifact(design, allow_unverified), design.report)
+
+
+def checked_artifact(design: TrackingDesign, allow_unverified: bool = False) -> Artifact:
+    """The artifact of a design, its claims and its robust gate decided on the very numbers that are shipped.
+
+    Args:
+        design: of a law; the baselines make no claim and have no gate.
+        allow_unverified: do not refuse, but write ``"released_unverified": true`` into the artifact.
+
+    Raises:
+        ClaimError: a claim does not hold, or the robust gate is not passed.
+    """
+    content = to_artifact(design).content()
+    if design.controller not in CHECKERS:
+        return Artifact.from_document(content)
+    verdict = verify(content, content["name"])
+    gate = _gate_findings(design, content)
+    failures = [f"{name}: does not hold in exact arithmetic" for name in verdict.failed]
+    if not gate["passed"]:
+        failures.append(_why_not_passed(gate))
+    if failures and not allow_unverified:
+        more = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
+        raise ClaimError(f"{content['name']}: not released: {failures[0]}{more}")
+    evidence = {**content["verification"], "certificate": verdict.findings(), "gate": gate}
+    if failures:
+        evidence["released_unverified"] = True
+    return Artifact.from_document({**content, "verification": evidence})
+
+
+def _gate_findings(design: TrackingDesign, content: Mapping[str, Any]) -> dict[str, Any]:
+    """What the gate of the law's kind found: a proof at the acceleration level, a grid check at the torque level."""
+    if design.controller == "dob-acceleration":
+        samples = design.inputs["specification"]["delay_samples"]
+        return robust_gate(content, content["name"], fmpq(*float(samples).as_integer_ratio())).to_document()
+    grid = ("passed", "proved", "worst_growth_rate_per_s", "growth_rates_per_s", "loops")
+    where = design.report["worst_growth_rate_at"]
+    return {**{name: design.report[name] for name in grid}, "where": where}
+
+
+def _why_not_passed(gate: Mapping[str, Any]) -> str:
+    """Half a line: what the gate wanted and what it found."""
+    needed, margin = gate.get("needed_range"), gate.get("inertia_margin")
+    if needed and margin:
+        (a, b), (low, high) = needed, margin
+        upper = "infinity" if high is None else f"{high:.4g}"
+        return f"robust gate: needed range [{a:.4g}, {b:.4g}] not proved inside the inertia margin [{low:.4g}, {upper}]"
+    rate = gate["worst_growth_rate_per_s"]
+    return "robust gate: not passed" + ("" if rate is None else f", worst growth rate {rate:.3g} 1/s")
 
 
 def design_inputs(robot_model: Robot, inputs: Mapping[str, Any]) -> dict[str, Any]:
@@ -77,7 +133,7 @@ def design_inputs(robot_model: Robot, inputs: Mapping[str, Any]) -> dict[str, An
 
 
 def to_artifact(design: TrackingDesign) -> Artifact:
-    """Compile a design's expressions and assemble its artifact."""
+    """Compile a design's expressions and assemble its artifact, unchecked (`checked_artifact` is what is released)."""
     source = design.robot
     rate = 1.0 / design.sample_period_s
     return Artifact.from_document(

@@ -15,12 +15,30 @@ from quasilpv.scenarios import ENCODER_BITS, Sensors
 from quasilpv.synthesis import CONTROLLERS, Specification
 from quasilpv.synthesis.acceleration_design import Progress
 
+SHORT_NAMES = {"acceleration": "dob-acceleration", "torque": "dob-torque"}
+
 RateOption: TypeAlias = Annotated[
     float | None, typer.Option("--rate-hz", help="Sample rate; the controller is designed for it.  [default: 1000]")
 ]
 EncoderOption: TypeAlias = Annotated[
     int | None,
     typer.Option("--encoder-bits", help=f"Encoder resolution, 0 for exact angles.  [default: {ENCODER_BITS}]"),
+]
+SpareOption: TypeAlias = Annotated[
+    float | None,
+    typer.Option(
+        "--margin-spare",
+        help="Factor by which the inertia margin exceeds the needed range on both sides."
+        f"  [default: {Specification.margin_spare}]",
+    ),
+]
+ActivityOption: TypeAlias = Annotated[
+    float | None,
+    typer.Option(
+        "--torque-activity",
+        help="Bound on the rms torque increment per sample caused by encoder quantisation, as a fraction of the torque"
+        f" limits.  [default: {Specification.torque_activity}]",
+    ),
 ]
 PlantOption: TypeAlias = Annotated[
     str, typer.Option("--plant", help="nominal, or perturbed: the full payload the design must cover.")
@@ -53,18 +71,24 @@ def sensors_of(encoder_bits: int) -> Sensors:
 
 
 def require_controller(controller: str) -> str:
-    """A controller id.
+    """The id of a controller, given by its id or its short name.
 
     Raises:
         InputError: unknown.
     """
-    if controller not in CONTROLLERS:
-        raise InputError("command line", "controller", controller, f"one of {', '.join(CONTROLLERS)}")
-    return controller
+    full = SHORT_NAMES.get(controller, controller)
+    if full not in CONTROLLERS:
+        raise InputError("command line", "controller", controller, f"one of {', '.join([*CONTROLLERS, *SHORT_NAMES])}")
+    return full
 
 
-def specification(rate_hz: float | None, encoder_bits: int | None) -> Specification:
-    """The specification for a rate and for encoders; what is not given, and exact angles, keep their default.
+def specification(
+    rate_hz: float | None,
+    encoder_bits: int | None,
+    margin_spare: float | None = None,
+    torque_activity: float | None = None,
+) -> Specification:
+    """The specification for these numbers; what is not given, and exact angles (0 bits), keep their default.
 
     Raises:
         InputError: out of range.
@@ -73,6 +97,8 @@ def specification(rate_hz: float | None, encoder_bits: int | None) -> Specificat
     return Specification(
         rate_hz=defaults.rate_hz if rate_hz is None else rate_hz,
         encoder_bits=encoder_bits or defaults.encoder_bits,
+        margin_spare=defaults.margin_spare if margin_spare is None else margin_spare,
+        torque_activity=defaults.torque_activity if torque_activity is None else torque_activity,
     )
 
 

@@ -9,7 +9,15 @@ import typer
 
 from quasilpv.artifact import write_artifact
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table, progress
-from quasilpv.cli.options import EncoderOption, RateOption, require_controller, specification
+from quasilpv.cli.options import (
+    SHORT_NAMES,
+    ActivityOption,
+    EncoderOption,
+    RateOption,
+    SpareOption,
+    require_controller,
+    specification,
+)
 from quasilpv.release import release
 from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER
 from quasilpv.systems.registry import robot
@@ -19,39 +27,57 @@ def synth_command(
     robot_id: Annotated[str, typer.Argument(metavar="ROBOT", help="Robot id, see design list.")],
     *,
     controller: Annotated[
-        str, typer.Option("--design", help=f"Controller: {', '.join(CONTROLLERS)}.")
+        str,
+        typer.Option("--design", help=f"Controller: {', '.join(CONTROLLERS)}; for short {' or '.join(SHORT_NAMES)}."),
     ] = DEFAULT_CONTROLLER,
     rate_hz: RateOption = None,
     encoder_bits: EncoderOption = None,
+    margin_spare: SpareOption = None,
+    torque_activity: ActivityOption = None,
+    allow_unverified: Annotated[
+        bool,
+        typer.Option(
+            "--allow-unverified", help="Write a design that fails its certificate or its gate; the artifact says so."
+        ),
+    ] = False,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="DIR", help="Folder for both twins.  [default: out/ROBOT]")
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Design a controller and write its artifact, as JSON and as CBOR.
+    """Design a controller, check what it claims, and write its artifact, as JSON and as CBOR.
+
+    Exit code 1, and nothing written, if no design meets the specification, if an inequality does not hold in exact
+    arithmetic, or if the robust gate is not passed.
 
     \b
     Example:
       design synth arm3 --rate-hz 2000 -o out/arm3-2khz
     """
     robot(robot_id)
-    require_controller(controller)
-    wanted = specification(rate_hz, encoder_bits)
+    design = require_controller(controller)
+    wanted = specification(rate_hz, encoder_bits, margin_spare, torque_activity)
     with progress(1) as steps:
-        steps.begin(f"{controller} for {robot_id}")
-        made = release(robot_id, controller, wanted, progress=steps.parts)
+        steps.begin(f"{design} for {robot_id}")
+        made = release(robot_id, design, wanted, allow_unverified=allow_unverified, progress=steps.parts)
         steps.end()
     paths = write_artifact(out or Path("out") / robot_id, made.artifact)
+    evidence = {name: found for name, found in (made.artifact.verification or {}).items() if name != "report"}
     answer: dict[str, Any] = {
         "artifact": {path.suffix.removeprefix("."): str(path) for path in paths},
         "name": made.artifact.name,
         "hash": made.artifact.hash,
         "report": dict(made.report),
+        "verification": evidence,
     }
     if json:
         print_json(answer)
         return
-    print_table(made.artifact.name, ("", ""), [(name, _text(value)) for name, value in made.report.items()], 2)
+    tables = {made.artifact.name: made.report, **{name: evidence[name] for name in ("certificate", "gate") if evidence}}
+    for title, members in tables.items():
+        print_table(title, ("", ""), [(name, _text(value)) for name, value in members.items()], 2)
+    if "released_unverified" in evidence:
+        print_note("released although not verified: the artifact says so")
     for path in paths:
         print_note(f"wrote {path}")
 

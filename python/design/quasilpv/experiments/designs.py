@@ -18,8 +18,9 @@ from quasilpv.systems.registry import robot
 
 DEFAULT_CACHE = Path("out/cache")
 
-# The rooms whose code decides what a design is; a change in any of them makes every kept design stale.
-_DESIGN_ROOMS = ("systems", "polytopes", "lmi", "conditions", "synthesis", "artifact", "release.py")
+# The rooms whose code decides what a design is and whether it is released; a change in any of them makes every kept
+# design stale.
+_DESIGN_ROOMS = ("systems", "polytopes", "lmi", "conditions", "synthesis", "certificate", "artifact", "release.py")
 
 
 def kept_design(
@@ -44,6 +45,7 @@ def kept_design(
     Raises:
         InputError: unknown robot or controller, or the cache cannot be written.
         InfeasibleError: no design meets the specification.
+        ClaimError: the design fails its certificate or its robust gate.
     """
     inputs = {
         "controller": controller,

@@ -89,7 +89,6 @@ class AccelerationDesign:
             "disturbance_gain_s2": chosen.disturbance_gain,
             "predicted_torque_increment_nm": chosen.torque_increment_nm,
             "candidates_tried": self.candidates_tried,
-            "proved": False,
         }
 
 
