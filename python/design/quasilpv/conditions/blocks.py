@@ -44,10 +44,25 @@ def block_diagonal(*blocks: Matrix) -> Matrix:
     return block(grid).constant
 
 
-def single_sum(problem: Problem, name: str, entry: Callable[[int], Expression], count: int) -> None:
-    """Require ``sum_i w_i X_i < 0`` for all convex weights: ``X_i < 0``."""
-    for i in range(count):
-        problem.negative(f"{name} {i}", entry(i))
+def single_sum(
+    problem: Problem,
+    name: str,
+    entry: Callable[[int], Expression],
+    count: int,
+    slack_blocks: npt.NDArray[np.intp] | None = None,
+) -> None:
+    """Require ``sum_i w_i X_i < 0`` for all convex weights: ``X_i < 0``, or ``X_i + T_k(i) - mean < 0`` with slack.
+
+    Args:
+        problem, name, count, slack_blocks: as in `double_sum`.
+        entry: X_i; only its symmetric part matters.
+    """
+    entries = [entry(i) for i in range(count)]
+    if slack_blocks is not None and len(set(slack_blocks)) > 1:
+        slack = _zero_mean(f"T {name}", slack_blocks, entries[0].shape[0])
+        entries = [X + T for X, T in zip(entries, slack, strict=True)]
+    for i, X in enumerate(entries):
+        problem.negative(f"{name} {i}", X)
 
 
 def double_sum(
@@ -72,8 +87,8 @@ def double_sum(
     """
     grid = [[entry(i, j) for j in range(count)] for i in range(count)]
     if slack_blocks is not None and len(set(slack_blocks)) > 1:
-        slack = _slack(name, slack_blocks, grid[0][0].shape[0])
-        grid = [[grid[i][j] + slack[i][j] for j in range(count)] for i in range(count)]
+        T, S = (_zero_mean(f"{letter} {name}", slack_blocks, grid[0][0].shape[0]) for letter in "TS")
+        grid = [[grid[i][j] + T[i] + S[j] for j in range(count)] for i in range(count)]
     for i in range(count):
         problem.negative(f"{name} {i} {i}", grid[i][i])
         for j in range(count):
@@ -81,10 +96,9 @@ def double_sum(
                 problem.negative(f"{name} {i} {j}", grid[i][i] * Fraction(2, count - 1) + grid[i][j] + grid[j][i])
 
 
-def _slack(name: str, blocks: npt.NDArray[np.intp], size: int) -> list[list[Expression]]:
-    """``T_k(i) + S_k(j) - (1/G) sum_k (T_k + S_k)`` for all i, j."""
+def _zero_mean(name: str, blocks: npt.NDArray[np.intp], size: int) -> list[Expression]:
+    """``T_k(i) - (1/G) sum_k T_k`` for every vertex i, one symmetric unknown T_k per block k."""
     groups = sorted(set(blocks.tolist()))
-    T, S = ({k: Variable(f"{letter}{k} {name}", size, symmetric=True).expression for k in groups} for letter in "TS")
-    mean = [(family[k]) * Fraction(-1, len(groups)) for family in (T, S) for k in groups]
-    shift = sum(mean[1:], mean[0])
-    return [[T[i] + S[j] + shift for j in blocks.tolist()] for i in blocks.tolist()]
+    T = {k: Variable(f"{name} {k}", size, symmetric=True).expression for k in groups}
+    mean = sum((T[k] for k in groups), zeros(size, size)) * Fraction(-1, len(groups))
+    return [T[k] + mean for k in blocks.tolist()]

@@ -13,15 +13,16 @@ Matrix: TypeAlias = npt.NDArray[Any]
 
 
 def to_rational(matrix: Any) -> Matrix:
-    """Matrix of `fractions.Fraction`, each the exact value of its double (or integer, or rational) entry."""
-    exact: Matrix = np.empty(np.shape(matrix), dtype=object)
-    exact[...] = [[Fraction(entry) for entry in row] for row in np.asarray(matrix, dtype=object)]
+    """Array of `fractions.Fraction`: the exact value of every double, integer or rational entry, in the same shape."""
+    array = np.asarray(matrix, dtype=object)
+    exact: Matrix = np.array([Fraction(entry) for entry in array.flat], dtype=object).reshape(array.shape)
     return exact
 
 
 def symmetric_part(matrix: Matrix) -> Matrix:
     """``(X + X') / 2``, exact for a rational matrix."""
-    return (matrix + matrix.T) * Fraction(1, 2)
+    symmetric: Matrix = (matrix + matrix.T) * Fraction(1, 2)
+    return symmetric
 
 
 def is_positive_definite(matrix: Matrix) -> bool:

@@ -22,7 +22,16 @@ def torque_law(robot: Robot, specification: Specification, progress: Progress = 
     Raises:
         InfeasibleError: no design meets the specification.
     """
-    design = design_torque_law(robot, specification, progress)
+    return tracking_design(robot, specification, design_torque_law(robot, specification, progress))
+
+
+def tracking_design(robot: Robot, specification: Specification, design: TorqueDesign) -> TrackingDesign:
+    """What a design of `design_torque_law` ships.
+
+    Args:
+        robot, specification: what it was made for.
+        design: vertex tables and evidence.
+    """
     tables = design.law
     return TrackingDesign(
         controller="dob-torque",
