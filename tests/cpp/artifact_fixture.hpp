@@ -105,14 +105,38 @@ struct TestArm {
     return result;
   }
 
-  /// Groups of one premise: X_i = X(z_c) + G (c_p - z_c,p) X_p.
+  /// Feedback [Kp Kd KI] of `dob-torque`: affine in the premises, and no multiple of the inertia.
+  Eigen::MatrixXd feedback(const Eigen::VectorXd& premise) const {
+    Eigen::MatrixXd gain(joints, 3 * joints);
+    gain << -4800.0 * inertia_of_premises(premise), -120.0 * inertia_of_premises(premise),
+        -64000.0 * inertia_of_premises(premise);
+    gain.array() += 3.0 * premise(0);
+    return gain;
+  }
+
+  /// Observer gains [L1; L2; L3; L4] of `dob-torque`.
+  Eigen::MatrixXd observer(const Eigen::VectorXd& premise) const {
+    const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(joints, joints);
+    Eigen::MatrixXd gain(4 * joints, joints);
+    gain << 2400.0 * one, 2.0e6 * one, 8.0e8 * inertia_of_premises(premise), 1.0e11 * inertia_of_premises(premise);
+    gain.array() += 40.0 * premise(joints - 1);
+    return gain;
+  }
+
   Json inertia_table() const {
-    const Eigen::MatrixXd centre = inertia_of_premises(Eigen::VectorXd::Constant(joints, kCentre));
+    return table_of([this](const Eigen::VectorXd& premise) { return inertia_of_premises(premise); });
+  }
+
+  /// Groups of one premise: X_i = X(z_c + G (c_p - z_c,p) e_p) for X affine in the premises.
+  template <class Affine>
+  Json table_of(const Affine& matrix) const {
     Json blocks = Json::array();
     for (int p = 0; p < joints; ++p) {
       Json vertices = Json::array();
       for (const double corner : {kLower, kUpper}) {
-        vertices.push_back(rows(centre + joints * (corner - kCentre) * inertia_slope(p)));
+        Eigen::VectorXd premise = Eigen::VectorXd::Constant(joints, kCentre);
+        premise(p) += joints * (corner - kCentre);
+        vertices.push_back(rows(matrix(premise)));
       }
       blocks.push_back({{"kind", "box"}, {"premises", Json::array({p})}, {"vertices", vertices}});
     }
@@ -136,6 +160,10 @@ inline Json law_table(const std::string& kind, const TestArm& arm) {
                 {"observer", {0.9, 550.0, 150000.0, 1.6e7}},
                 {"filter_time_constant_s", 1e-3},
                 {"disturbance_compensation", true}});
+  } else if (kind == "dob-torque") {
+    law.update({{"feedback", arm.table_of([&arm](const Eigen::VectorXd& z) { return arm.feedback(z); })},
+                {"observer", arm.table_of([&arm](const Eigen::VectorXd& z) { return arm.observer(z); })},
+                {"filter_time_constant_s", 1e-3}});
   } else if (kind == "pid") {
     law.update({{"kp", repeated(4000.0)},
                 {"kd", repeated(300.0)},
@@ -157,7 +185,7 @@ inline Json artifact_table(const std::string& kind, int joints) {
   Json programs = {{"premises", arm.premises_program()}, {"gravity", arm.gravity_program()}};
   if (kind == "pid") {
     programs["coriolis_reference"] = arm.coriolis_program("reference_speed");
-  } else if (kind != "dob-acceleration") {
+  } else if (kind == "ctc" || kind == "ctc-dob") {
     programs["coriolis"] = arm.coriolis_program("speed");
   }
   const Json interval = Json(std::vector<Json>(joints, Json::array({-2.0, 2.0})));

@@ -67,7 +67,7 @@ TEST(Artifact, is_the_same_from_either_twin_and_from_a_file) {
 }
 
 TEST(Artifact, loads_every_kind_for_every_number_of_joints) {
-  for (const char* kind : {"dob-acceleration", "pid", "ctc", "ctc-dob"}) {
+  for (const char* kind : {"dob-acceleration", "dob-torque", "pid", "ctc", "ctc-dob"}) {
     for (int joints = 1; joints <= kMaxJoints; ++joints) {
       const Artifact artifact = parse(artifact_table(kind, joints));
       EXPECT_EQ(artifact.law_kind(), kind);
@@ -132,6 +132,18 @@ TEST(Artifact, refuses_a_bandwidth_that_contradicts_the_kind) {
   const char* bandwidth = "/law/disturbance_observer_bandwidth_rad_s";
   EXPECT_THAT(refused(bandwidth, 50.0, "ctc"), HasSubstr("law.disturbance_observer_bandwidth_rad_s: got 50"));
   EXPECT_THAT(refused(bandwidth, 0, "ctc-dob"), HasSubstr("law.disturbance_observer_bandwidth_rad_s: got 0"));
+}
+
+TEST(Artifact, refuses_gain_tables_of_another_shape_or_another_schedule_than_the_inertia) {
+  EXPECT_THAT(refused("/law/feedback/lower/0", -0.6, "dob-torque"),
+              HasSubstr("a.json: law.feedback: got another box, centre or partition of the premises"));
+  EXPECT_THAT(refused("/law/observer/centre/2", 0.3, "dob-torque"),
+              HasSubstr("a.json: law.observer: got another box, centre or partition of the premises"));
+  EXPECT_THAT(refused("/law/feedback/blocks/0/vertices/0/0", {1.0, 2.0, 3.0}, "dob-torque"),
+              HasSubstr("a.json: law.feedback.blocks[0].vertices[0][0]: got an array of 3"));
+  EXPECT_THAT(refused("/law/observer/blocks/1/vertices/1/12", {1.0, 2.0, 3.0}, "dob-torque"),
+              HasSubstr("a.json: law.observer.blocks[1].vertices[1]: got 13 rows, expected 12"));
+  EXPECT_THAT(refused("/law/filter_time_constant_s", 0, "dob-torque"), HasSubstr("law.filter_time_constant_s: got 0"));
 }
 
 TEST(Artifact, refuses_an_inertia_that_is_not_symmetric) {

@@ -106,6 +106,50 @@ struct WrittenOutDobAcceleration : WrittenOutLaw {
   }
 };
 
+struct WrittenOutDobTorque : WrittenOutLaw {
+  using WrittenOutLaw::WrittenOutLaw;
+  Eigen::VectorXd x, d_f;  // x = [th, w, d, dd]
+
+  // The correction as the linear equation it solves, x = x_hat + T L (y - C x); the prediction as the exponential of
+  // the nilpotent chain.
+  Eigen::VectorXd step(const Sample& s) override {
+    const double T = kSamplePeriod;
+    const double q = std::exp(-T / 1e-3);
+    const Eigen::Index n = arm.joints;
+    if (!started) {
+      x = Eigen::VectorXd::Zero(4 * n);
+      x.head(n) = s.angle;
+      d_f = Eigen::VectorXd::Zero(n);
+      started = true;
+    }
+    const Eigen::VectorXd z = arm.premises(s.angle);
+    const Eigen::MatrixXd M = arm.inertia(s.angle);
+    const Eigen::VectorXd G = arm.gravity(s.angle);
+    const Eigen::MatrixXd L = arm.observer(z);
+    Eigen::MatrixXd implicit = Eigen::MatrixXd::Identity(4 * n, 4 * n);
+    implicit.leftCols(n) += T * L;
+    x = implicit.partialPivLu().solve(x + T * L * s.angle).eval();
+    disturbance = x.segment(2 * n, n);
+    d_f = q * d_f + (1.0 - q) * disturbance;
+    Eigen::VectorXd error(3 * n);
+    error << x.head(n) - s.reference, x.segment(n, n) - s.reference_speed, integral;
+    const Eigen::VectorXd commanded = M * s.reference_acceleration - d_f + arm.feedback(z) * error + G;
+    const Eigen::VectorXd applied = output.apply(commanded);
+    integrate(s.angle - s.reference, -1.0, commanded, applied, integral);
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(4 * n, 4 * n);
+    A.block(0, n, n, n).setIdentity();
+    A.block(n, 2 * n, n, n) = M.inverse();
+    A.block(2 * n, 3 * n, n, n).setIdentity();
+    const Eigen::MatrixXd transition =
+        Eigen::MatrixXd::Identity(4 * n, 4 * n) + T * A + T * T / 2.0 * A * A + T * T * T / 6.0 * A * A * A;
+    const Eigen::VectorXd acceleration = M.inverse() * (applied - G);
+    x = (transition * x).eval();
+    x.head(n) += T * T / 2.0 * acceleration;
+    x.segment(n, n) += T * acceleration;
+    return commanded;
+  }
+};
+
 struct WrittenOutPid : WrittenOutLaw {
   using WrittenOutLaw::WrittenOutLaw;
   Eigen::VectorXd w;

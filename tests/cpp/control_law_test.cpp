@@ -24,6 +24,7 @@ using ::quasilpv::testing::to_joint_array;
 using ::quasilpv::testing::to_vector;
 using ::quasilpv::testing::WrittenOutComputedTorque;
 using ::quasilpv::testing::WrittenOutDobAcceleration;
+using ::quasilpv::testing::WrittenOutDobTorque;
 using ::quasilpv::testing::WrittenOutLaw;
 using ::quasilpv::testing::WrittenOutPid;
 
@@ -48,6 +49,9 @@ std::unique_ptr<WrittenOutLaw> written_out(const Case& c, const OutputStage& out
   const TestArm arm{c.joints};
   if (c.kind == "dob-acceleration") {
     return std::make_unique<WrittenOutDobAcceleration>(arm, output);
+  }
+  if (c.kind == "dob-torque") {
+    return std::make_unique<WrittenOutDobTorque>(arm, output);
   }
   if (c.kind == "pid") {
     return std::make_unique<WrittenOutPid>(arm, output);
@@ -249,7 +253,8 @@ TEST_P(EveryLaw, when_saturated_expect_the_integral_frozen_only_in_that_directio
 
 INSTANTIATE_TEST_SUITE_P(ControlLaw, EveryLaw,
                          ::testing::Values(Case{"dob-acceleration", 1}, Case{"dob-acceleration", 3},
-                                           Case{"dob-acceleration", 7}, Case{"pid", 1}, Case{"pid", 3}, Case{"pid", 7},
+                                           Case{"dob-acceleration", 7}, Case{"dob-torque", 1}, Case{"dob-torque", 3},
+                                           Case{"dob-torque", 7}, Case{"pid", 1}, Case{"pid", 3}, Case{"pid", 7},
                                            Case{"ctc", 1}, Case{"ctc", 3}, Case{"ctc", 7}, Case{"ctc-dob", 1},
                                            Case{"ctc-dob", 3}, Case{"ctc-dob", 7}),
                          [](const auto& c) {
