@@ -6,13 +6,15 @@ gain is rational in z, ``K(z) = Y(z) E(z)^-T P^-1``, because the Lyapunov matrix
 ``P E(z)'``; slack matrices L, R separate ``A(z)`` from it, so the inequalities are linear in the weights.
 
 As printed (Dehak 2022, Theorem III.10) nothing bounds P from below or Y from above, and solvers return gains of 1e10.
-With ``P > I`` and ``||Y_i|| < kappa`` minimised, ``||K(z)|| < kappa ||E(z)^-1||``.
+Here a limit kappa is part of the problem: ``P > beta I`` and ``||Y_i|| < kappa beta`` with an unknown beta give
+``||K(z)|| < kappa ||E(z)^-1||``, and the L2 gain is as small as that allows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +33,7 @@ class TrackingCondition:
     problem: Problem
     P: Variable
     Y: tuple[Variable, ...]
-    kappa: Variable
+    gamma: Variable
 
     def gain(self, solution: Solution, weights: FloatArray, descriptor: FloatArray) -> FloatArray:
         """``K(z) = Y(z) E(z)^-T P^-1``, (m, N_xi).
@@ -42,7 +44,7 @@ class TrackingCondition:
             descriptor: E(z) at the measured premises.
         """
         Y = sum(w * solution.values[Yi] for w, Yi in zip(weights, self.Y, strict=True))
-        return np.asarray(np.linalg.solve(solution.values[self.P] @ descriptor.T, np.asarray(Y).T).T)
+        return np.asarray(np.linalg.solve(descriptor @ solution.values[self.P], np.asarray(Y).T).T)
 
 
 def tracking_condition(
@@ -52,14 +54,14 @@ def tracking_condition(
     output: Matrix,
     *,
     decay: float,
-    gamma: float,
+    gain_limit: float,
     blocks: npt.NDArray[np.intp],
     shared_gain: Sequence[int],
 ) -> TrackingCondition:
-    """Feedback with decay rate alpha and squared L2 gain gamma from d to psi, of smallest gain bound kappa.
+    """Feedback of limited gain with decay rate alpha and the smallest squared L2 gain gamma from d to psi.
 
-    Unknowns ``P = P'``, L, R, Y_i and one symmetric T_k per block (premise); minimise kappa subject to ``P > I``,
-    ``[kappa I, Y_i; *, kappa I] > 0`` and, with ``mean = (1/G) sum_k T_k``,
+    Unknowns ``P = P'``, L, R, Y_i, beta and one symmetric T_k per block (premise); minimise gamma subject to
+    ``P > beta I``, ``[kappa beta I, Y_i; *, kappa beta I] > 0`` and, with ``mean = (1/G) sum_k T_k``,
 
         He [A_i L + S_i, A_i R; P_i - L, -R] + T_k(i) - mean < 0
         A_i = [[A_i + alpha E_i, 0, 0], [0, 0, 0], [C, 0, 0]],  P_i = diag(P E_i', I, I)
@@ -70,7 +72,7 @@ def tracking_condition(
         drive: B, (N_xi, m).
         output: C, (n, N_xi).
         decay: alpha; it multiplies an unknown, so a line search is the way to the largest.
-        gamma: bound on the squared L2 gain.
+        gain_limit: kappa, N m per unit of the state times the norm of E.
         blocks: block (premise) of every vertex.
         shared_gain: for every vertex, the vertex whose gain it must share (`BlockPolytope.shared_gain`): the gain must
             not depend on unknown premises.
@@ -83,7 +85,7 @@ def tracking_condition(
     L, R = Variable("L", width), Variable("R", width)
     own = {vertex: Variable(f"Y{vertex}", m, size) for vertex in sorted(set(shared_gain))}
     Y = tuple(own[vertex] for vertex in shared_gain)
-    kappa = Variable("kappa", 1)
+    gamma, beta = Variable("gamma", 1), Variable("beta", 1)
 
     def entry(i: int) -> Expression:
         A = np.zeros((width, width), dtype=int).astype(object)
@@ -92,7 +94,7 @@ def tracking_condition(
         S = block(
             [
                 [drive @ Y[i], constant(drive), zeros(size, n)],
-                [zeros(m, size), constant(inputs * (-gamma / 2)), zeros(m, n)],
+                [zeros(m, size), gamma * (inputs * Fraction(-1, 2)), zeros(m, n)],
                 [zeros(n, size), zeros(n, m), constant(outputs * -0.5)],
             ]
         )
@@ -101,9 +103,12 @@ def tracking_condition(
         return he(block([[A @ L + S, A @ R], [lyapunov - L, -R.expression]]))
 
     problem = Problem()
-    problem.positive("P > I", P - identity_blocks(size)[0])
+    states = identity_blocks(size)[0]
+    problem.positive("beta", beta.expression)
+    problem.positive("P > beta I", P - beta * states)
     for vertex, gain in own.items():
-        problem.positive(f"gain {vertex}", block([[kappa * inputs, gain], [None, kappa * identity_blocks(size)[0]]]))
+        limit = beta * gain_limit
+        problem.positive(f"gain {vertex}", block([[limit * inputs, gain], [None, limit * states]]))
     single_sum(problem, "Xi", entry, count, blocks)
-    problem.minimise(kappa)
-    return TrackingCondition(problem, P, Y, kappa)
+    problem.minimise(gamma)
+    return TrackingCondition(problem, P, Y, gamma)
