@@ -293,11 +293,19 @@ def test_when_the_delay_margin_is_bisected_expect_it_tight(loop: AccelerationLoo
     assert max(growth_rate(loop, to_float(ratio), beyond) for ratio in (LOWEST, HIGHEST)) > -1e-6
 
 
-def test_when_a_crossing_lies_in_the_rectangle_expect_no_proof() -> None:
-    rectangle = StabilityRectangle.of(DEFAULT, LOWEST, HIGHEST)
-    outside = proved_delays(DEFAULT).not_inside
-    assert outside is not None
-    assert not rectangle.is_free_of_crossings(outside)
+@settings(max_examples=12, deadline=None)
+@given(st.fractions(0, Fraction(2, 3), max_denominator=50), st.sampled_from([0, 1]), st.floats(1.0, 1.5))
+def test_when_the_rectangle_holds_one_crossing_expect_no_proof(at: Fraction, side: int, longer: float) -> None:
+    delay = fmpq(at.numerator, at.denominator)
+    margin = inertia_margin(DEFAULT, delay)
+    assert margin is not None
+    inner, outer = margin.inner[side], margin.outer[side]
+    assert inner is not None
+    assert outer is not None
+    rectangle = StabilityRectangle.of(DEFAULT, min(inner, outer), max(inner, outer))
+    assert not rectangle.is_free_of_crossings(delay * rational(longer), budget=1500)
+    apart = StabilityRectangle.of(DEFAULT, fmpq(1), fmpq(2))
+    assert apart.is_free_of_crossings(delay, budget=1500)
 
 
 def test_when_the_needed_range_does_not_fit_without_delay_expect_no_delay_margin() -> None:

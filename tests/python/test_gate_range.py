@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from quasilpv.artifact import Artifact, write_artifact
 from quasilpv.certificate.exact_matrices import rational
 from quasilpv.certificate.gate import RobustGate, margin_curve, robust_gate
-from quasilpv.certificate.gate_cells import Cells, are_positive_definite, cosine_enclosure
+from quasilpv.certificate.gate_cells import Cells, Pencil, are_positive_definite, cosine_enclosure
 from quasilpv.certificate.gate_data import arm_inertia_data, cosine_pairs, loop_data
 from quasilpv.certificate.gate_inertia import design_inertia, true_inertia
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_range
@@ -123,6 +123,50 @@ def test_when_a_cosine_is_enclosed_expect_its_range_and_nothing_wider(start: flo
         values = [mpmath.cos(mpmath.mpf(start)), mpmath.cos(mpmath.mpf(end)), *inside]
         assert below == pytest.approx(float(min(values)), abs=1e-15)
         assert above == pytest.approx(float(max(values)), abs=1e-15)
+
+
+PAIRS = ((0, 1), (1, 2), (0, 2))
+
+
+def random_pencil(seed: int, level: list[int]) -> tuple[np.ndarray, Cells, float]:
+    """Random coefficients, a random cell, and the smallest eigenvalue that samples of the cell find."""
+    rng = np.random.default_rng(seed)
+    K = rng.normal(size=(4, 4, 3, 3))
+    K = np.round((K + np.swapaxes(K, 2, 3)) * 2**20) / 2**20
+    index = [int(rng.integers(2**depth)) for depth in level]
+    cell = Cells((fmpq(-2), fmpq(-1), fmpq(0)), (fmpq(1), fmpq(3), fmpq(1)), np.array([level]), np.array([index]))
+    low, high = cell.bounds()
+    corners = np.stack(np.meshgrid(*np.vstack([low, high]).T, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = np.vstack([corners, rng.uniform(low, high, size=(3000, 3))])
+    cosines = np.column_stack([np.ones(len(points)), *(np.cos(points[:, i:j].sum(axis=1)) for i, j in PAIRS)])
+    X = np.einsum("np,nk,pkab->nab", points[:, 2:] ** np.arange(4), cosines, K)
+    return K, cell, float(np.linalg.eigvalsh(X)[:, 0].min())
+
+
+def is_proved(K: np.ndarray, shift: float, cell: Cells) -> bool:
+    """Whether the pencil minus ``shift`` times the identity is proved positive definite on the cell."""
+    exact = np.vectorize(rational, otypes=[object])(K)
+    for i in range(3):
+        exact[0, 0, i, i] -= rational(shift)
+    pencil = Pencil.enclosing(exact, np.full((3, 3), fmpq(0), dtype=object))
+    return bool(are_positive_definite(pencil, PAIRS, cell)[0])
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 2**31), st.lists(st.integers(0, 4), min_size=3, max_size=3))
+def test_when_a_random_matrix_is_barely_indefinite_somewhere_in_a_cell_expect_no_proof(
+    seed: int, level: list[int]
+) -> None:
+    K, cell, smallest = random_pencil(seed, level)
+    assert not is_proved(K, smallest + 1e-9, cell)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 2**31), st.sampled_from([5, 7, 9]))
+def test_when_cells_shrink_expect_the_overestimate_to_shrink_with_their_square(seed: int, depth: int) -> None:
+    K, cell, smallest = random_pencil(seed, [depth] * 3)
+    width = (np.array([3.0, 4.0, 1.0]) / 2**depth).sum()
+    assert is_proved(K, smallest - 2 * width**2 * float(np.abs(K).sum()), cell)
 
 
 @settings(max_examples=60, deadline=None)

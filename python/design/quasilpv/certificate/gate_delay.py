@@ -106,13 +106,17 @@ class StabilityRectangle:
         denominator = _hull(first.denominator * ZETA**2 * Z, second.denominator * ZETA**2 * Z)
         return cls(numerator, denominator, lowest, highest)
 
-    def is_free_of_crossings(self, delay_samples: fmpq) -> bool:
-        """Whether no ratio and no delay in [0, delay_samples] puts a root on the unit circle: proved, or not known."""
+    def is_free_of_crossings(self, delay_samples: fmpq, budget: int = MAX_CELLS) -> bool:
+        """Whether no ratio and no delay in [0, delay_samples] puts a root on the unit circle: proved, or not known.
+
+        Args:
+            delay_samples: longest delay.
+            budget: cells after which it stays unknown.
+        """
         with ctx.workprec(BITS):
             whole = int(delay_samples.floor())
             starts = [fmpq(w) for w in range(whole + 1)]
             ends = [*starts[1:], delay_samples]
-            budget = MAX_CELLS
             for start, end in zip(starts, ends, strict=True):
                 budget = self._exclude(int(start), end - start, budget)
             return budget > 0
