@@ -254,7 +254,8 @@ TEST_P(EveryLoop, brings_a_disturbed_arm_to_its_reference) {
   EXPECT_LT(plant.angle.cwiseAbs().maxCoeff(), 1e-6);
 }
 
-INSTANTIATE_TEST_SUITE_P(ClosedLoop, EveryLoop, ::testing::Values("dob-acceleration", "pid", "ctc", "ctc-dob"),
+INSTANTIATE_TEST_SUITE_P(ClosedLoop, EveryLoop,
+                         ::testing::Values("dob-acceleration", "dob-torque", "pid", "ctc", "ctc-dob"),
                          [](const auto& kind) {
                            std::string name = kind.param;
                            std::replace(name.begin(), name.end(), '-', '_');
