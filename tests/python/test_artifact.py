@@ -29,6 +29,7 @@ LAWS: dict[str, dict[str, Any]] = {
         "filter_time_constant_s": 1e-3,
         "disturbance_compensation": True,
     },
+    "dob-torque": {"filter_time_constant_s": 5e-4},  # and gain tables, made with the inertia
     "pid": {**{f"k{name}": gains for name, gains in GAINS.items()}, "velocity_filter_time_constant_s": 2e-3},
     "ctc": {
         **{"gp": [3 * W**2] * 3, "gd": [3 * W] * 3, "gi": [W**3] * 3},
@@ -71,6 +72,11 @@ def arm3_document(kind: str = "dob-acceleration") -> dict[str, Any]:
     polytope = BlockPolytope.per_premise(*np.array(bounds).T)
     affine = arm3.model.inertia_affine()
     inertia = polytope.to_document(polytope.vertices(affine.constant, affine.coefficients))
+    law = {"kind": kind, **LAWS[kind], "inertia": inertia}
+    if kind == "dob-torque":
+        vertices = np.ones((polytope.vertex_count, 3, 9)) * np.arange(9.0)
+        law["feedback"] = polytope.to_document(-vertices)
+        law["observer"] = polytope.to_document(np.concatenate([vertices.swapaxes(1, 2), vertices[:, :, :3]], axis=1))
     document = {
         "schema": "quasilpv.artifact",
         "schema_version": 1,
@@ -85,7 +91,7 @@ def arm3_document(kind: str = "dob-acceleration") -> dict[str, Any]:
         "domain": arm3.domain.to_document(),
         "limits": arm3.limits.to_document(),
         "programs": {name: ARM3_PROGRAMS[name] for name in REQUIRED_PROGRAMS[kind]},
-        "law": {"kind": kind, **LAWS[kind], "inertia": inertia},
+        "law": law,
         "witness": {"condition": "chain-lmi", "P": [[1.5, 0.25], [0.25, 2.0]]},
         "verification": {"gate": {"margin": 0.03}},
     }
@@ -213,7 +219,7 @@ VERTICES = ("law", "inertia", "blocks", 0, "vertices")
         (
             at("law", "kind", value="lqr"),
             "law",
-            "got 'lqr', expected one of 'dob-acceleration', 'pid', 'ctc', 'ctc-dob'",
+            "got 'lqr', expected one of 'dob-acceleration', 'dob-torque', 'pid', 'ctc', 'ctc-dob'",
         ),
         (without("law", "kind"), "law", "got nothing, expected a member 'kind'"),
         (without("law", "observer"), "law.observer", "got nothing"),
@@ -261,6 +267,34 @@ def test_when_a_rule_of_the_format_is_broken_expect_one_line_with_field_got_and_
     assert message in str(error.value)
     assert str(error.value).startswith("artifact.json: ")
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "message"),
+    [
+        (at("law", "feedback", "lower", 1, value=0.4), "law.feedback", "that of law.inertia"),
+        (at("law", "observer", "centre", 0, value=0.0), "law.observer", "that of law.inertia"),
+        (at("law", "feedback", "blocks", value=[]), "law.feedback.blocks", "in exactly one block"),
+        (at("law", "observer", value=1), "law.observer", "got 1"),
+        (without("law", "filter_time_constant_s"), "law.filter_time_constant_s", "got nothing"),
+    ],
+)
+def test_when_a_gain_table_does_not_fit_the_inertia_expect_it_named(
+    change: Callable[[dict], None], field: str, message: str
+) -> None:
+    document = arm3_document("dob-torque")
+    change(document)
+    with pytest.raises(InputError) as error:
+        Artifact.from_document(document, "artifact.json")
+    assert (error.value.field, message in str(error.value)) == (field, True)
+
+
+def test_when_gain_tables_are_exchanged_expect_the_size_of_a_vertex_named() -> None:
+    document = arm3_document("dob-torque")
+    law = document["law"]
+    law["feedback"], law["observer"] = law["observer"], law["feedback"]
+    with pytest.raises(InputError, match=r"law.feedback.blocks\[0\].vertices\[0\]: got 12 x 3, expected 3 x 9"):
+        Artifact.from_document(document, "artifact.json")
 
 
 @pytest.mark.parametrize(("kind", "bandwidth"), [("ctc", 50.0), ("ctc-dob", 0)])
