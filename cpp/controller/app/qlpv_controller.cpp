@@ -108,8 +108,8 @@ int run(const CLI::App& app, Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs one controller against a plant over LCM until the plant ends the run.", "qlpv-controller");
   Options options;
-  declare_all(app, options);
-  return run_main(app, argc, argv, [&] { return run(app, options); });
+  return run_main(
+      argc, argv, "qlpv-controller", "Runs one controller against a plant over LCM until the plant ends the run.",
+      [&](CLI::App& app) { declare_all(app, options); }, [&](const CLI::App& app) { return run(app, options); });
 }

@@ -147,8 +147,8 @@ int run(const CLI::App& app, Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Runs the plant of a scenario against a controller over LCM.", "qlpv-simulator");
   Options options;
-  declare_all(app, options);
-  return run_main(app, argc, argv, [&] { return run(app, options); });
+  return run_main(
+      argc, argv, "qlpv-simulator", "Runs the plant of a scenario against a controller over LCM.",
+      [&](CLI::App& app) { declare_all(app, options); }, [&](const CLI::App& app) { return run(app, options); });
 }

@@ -75,18 +75,25 @@ inline bool apply_priority(const CLI::App& app, const CommonOptions& options) {
   return false;
 }
 
-/// Parses the command line and runs `body`; every error becomes one line on stderr and its exit code.
-inline int run_main(CLI::App& app, int argc, char** argv, const std::function<int()>& body) {
-  const auto fail = [&app](const char* what, ExitCode code) {
-    std::cerr << app.get_name() << ": " << what << '\n';
+/// Declares the options, parses the command line and runs `body`; every error becomes one line on stderr and its exit
+/// code. Never throws.
+inline int run_main(int argc, char** argv, const std::string& name, const std::string& description,
+                    const std::function<void(CLI::App&)>& declare_options,
+                    const std::function<int(const CLI::App&)>& body) noexcept {
+  const auto fail = [&name](const char* what, ExitCode code) {
+    std::cerr << name << ": " << what << '\n';
     return static_cast<int>(code);
   };
   try {
-    app.parse(argc, argv);
-    return body();
-  } catch (const CLI::CallForHelp&) {
-    std::cout << app.help();
-    return kExitDone;
+    CLI::App app(description, name);
+    declare_options(app);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::CallForHelp&) {
+      std::cout << app.help();
+      return kExitDone;
+    }
+    return body(app);
   } catch (const CLI::ParseError& error) {
     return fail(error.what(), kExitBadInput);
   } catch (const InputError& error) {
@@ -97,6 +104,8 @@ inline int run_main(CLI::App& app, int argc, char** argv, const std::function<in
     return fail(error.what(), kExitNoTransport);
   } catch (const PlantError& error) {
     return fail(error.what(), kExitPlantFailure);
+  } catch (const std::exception& error) {
+    return fail(error.what(), kExitInternal);
   }
 }
 

@@ -12,6 +12,7 @@ namespace quasilpv {
 /// Exit codes of both executables.
 enum ExitCode : int {
   kExitDone = 0,
+  kExitInternal = 1,  ///< anything not foreseen below, for example no memory
   kExitBadInput = 2,
   kExitFaultStop = 3,
   kExitNoRealtime = 4,
