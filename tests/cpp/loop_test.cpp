@@ -319,19 +319,26 @@ TEST_P(AfterAFault, reaches_the_safe_torque_within_50_ms_without_a_jump_and_stay
   ControlLoop loop(artifact(), trajectory(), settings);
   loop.handle(measurement(0), at(0));
   std::int64_t seq = 1;
+  JointArray before{};
   for (; loop.state() != ControllerState::kFault; ++seq) {
     ASSERT_LE(seq, 20);
+    before = torque_of(loop);
     loop.handle(measurement(seq, {kNaN, kNaN, kNaN}), at(seq));
   }
   const JointArray at_fault = torque_of(loop);
+  EXPECT_EQ(at_fault, before);
+  EXPECT_NE(at_fault, JointArray{});
   JointArray safe{};
   for (std::size_t j = 0; j < kJoints && GetParam() == SafeAction::kGravity; ++j) {
     safe[j] = 9.81 * static_cast<double>(j + 1) * std::sin(kStart[j]);
   }
+  constexpr double kRampSamples = 40.0;
   for (std::int64_t sample = 0; sample < 200; ++sample, ++seq) {
+    const JointArray previous = torque_of(loop);
     loop.handle(measurement(seq), at(seq));
     for (std::size_t j = 0; j < kJoints; ++j) {
       const double torque = torque_of(loop)[j];
+      ASSERT_LE(std::abs(torque - previous[j]), std::abs(at_fault[j] - safe[j]) / kRampSamples + 1e-9);
       ASSERT_LE(std::abs(torque - safe[j]), std::abs(at_fault[j] - safe[j]) + 1e-9);
       if (sample >= 50) {
         ASSERT_DOUBLE_EQ(torque, safe[j]);
