@@ -1,253 +1,44 @@
-// Controller and plant around a link: the two-process run must be the in-process run, and losses must end safely.
+// The controller's side of a run: losses, faults and stops must end in the safe torque.
 #include "quasilpv/loop.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <thread>
+#include <utility>
 
-#include "arm_fixtures.hpp"
-#include "artifact_fixture.hpp"
+#include "loop_fixture.hpp"
 #include "quasilpv/errors.hpp"
 #include "quasilpv/in_process_link.hpp"
-#include "quasilpv/plant_loop.hpp"
 #include "quasilpv/realtime.hpp"
 #include "quasilpv/run_controller.hpp"
-#include "quasilpv/simulation.hpp"
 
 namespace quasilpv {
 namespace {
 
+using ::quasilpv::testing::artifact;
 using ::quasilpv::testing::artifact_table;
+using ::quasilpv::testing::at;
+using ::quasilpv::testing::identity_of;
 using ::quasilpv::testing::json_twin;
+using ::quasilpv::testing::kJoints;
+using ::quasilpv::testing::kMillisecond;
+using ::quasilpv::testing::kPatience;
 using ::quasilpv::testing::kSamplePeriod;
-using ::quasilpv::testing::three_link_arm;
+using ::quasilpv::testing::kStart;
+using ::quasilpv::testing::measurement;
+using ::quasilpv::testing::trajectory;
 
-constexpr int kJoints = 3;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr std::int64_t kMillisecond = kNanosecondsPerMillisecond;
-constexpr std::int64_t kPatience = 5 * kNanosecondsPerSecond;
-const JointArray kStart{0.3, -0.2, 0.4};
-
-/// Minimum-jerk motion of all joints by 0.2 rad in 1 s, from kStart.
-Trajectory trajectory() {
-  Json segment = Json::array();
-  for (int j = 0; j < kJoints; ++j) {
-    segment.push_back({kStart[static_cast<std::size_t>(j)], 0.0, 0.0, 2.0, -3.0, 1.2});
-  }
-  const Json table = {{"schema", "quasilpv.trajectory"},
-                      {"schema_version", 1},
-                      {"name", "minimum-jerk"},
-                      {"joints", kJoints},
-                      {"task", nullptr},
-                      {"knots_s", {0.0, 1.0}},
-                      {"coefficients", Json::array({segment})}};
-  return Trajectory::parse(json_twin(table), "test");
-}
-
-Artifact artifact(const std::string& kind = "dob-acceleration") {
-  return Artifact::parse(json_twin(artifact_table(kind, kJoints)), "test");
-}
-
-/// Every imperfection on: a difference in the order of calls or in the number of noise samples shows.
-Scenario scenario(std::int64_t samples) {
-  Scenario scenario;
-  scenario.name = "test";
-  scenario.duration_s = static_cast<double>(samples) * kSamplePeriod;
-  scenario.plant = three_link_arm(0.5);
-  scenario.external_torque = {{1, 20.0, 15.0, 0.3}};
-  scenario.sensors = {20, 0.05, 7};
-  scenario.transport_delay_s = 0.3 * kSamplePeriod;
-  scenario.initial_angle = kStart;
-  return scenario;
-}
-
-WireIdentity identity_of(const Artifact& artifact) { return {11, artifact.hash_prefix(), artifact.joints()}; }
-
-measurement_v1 measurement(std::int64_t seq, const JointArray& angle = kStart) {
-  measurement_v1 message{};
-  message.seq = seq;
-  std::copy(angle.begin(), angle.end(), message.angle_rad);
-  return message;
-}
-
-SampleConditions at(std::int64_t seq) {
-  SampleConditions conditions;
-  conditions.now_ns = seq * kMillisecond;
-  return conditions;
-}
 
 JointArray torque_of(const ControlLoop& loop) {
   JointArray torque;
   std::copy(std::begin(loop.command().torque_nm), std::end(loop.command().torque_nm), torque.begin());
   return torque;
-}
-
-void expect_equal_columns(const Record& record, const Record& expected, const std::string& name,
-                          const std::string& expected_name) {
-  const std::vector<double>& values = record[name].values;
-  const std::vector<double>& others = expected[expected_name].values;
-  ASSERT_EQ(values.size(), others.size()) << name;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    ASSERT_EQ(values[i], others[i]) << name << " value " << i;
-  }
-}
-
-void expect_plant_record(const Record& record, const Record& in_process) {
-  for (const char* name : {"time_s", "angle_rad", "speed_rad_s", "acceleration_rad_s2", "external_torque_nm"}) {
-    expect_equal_columns(record, in_process, name, name);
-  }
-  expect_equal_columns(record, in_process, "torque_nm", "torque_applied_nm");
-}
-
-class EveryLaw : public ::testing::TestWithParam<const char*> {};
-
-TEST_P(EveryLaw, gives_over_a_link_in_lock_step_the_samples_of_the_in_process_run_bit_for_bit) {
-  constexpr std::int64_t kSamples = 400;
-  const Artifact law = artifact(GetParam());
-  const Scenario experiment = scenario(kSamples);
-  Controller controller(law);
-  const RunRecord in_process = run_closed_loop(experiment, controller, trajectory());
-
-  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
-  ControlLoop loop(law, trajectory(), {});
-  auto ring = std::make_unique<TelemetryPublisher::Ring>();
-  const std::atomic<bool> stop{false};
-  ControllerRunReport controller_report;
-  std::thread thread(
-      [&, link = controller_end.get()] { controller_report = run_controller(loop, *link, ring.get(), {}, stop); });
-  PlantSession session(experiment, kSamplePeriod);
-  Record record;
-  const PlantRunReport plant_report = run_plant(session, *plant_end, {}, &record, stop);
-  thread.join();
-
-  EXPECT_EQ(plant_report.end, PlantRunEnd::kCompleted);
-  EXPECT_EQ(plant_report.samples, kSamples);
-  EXPECT_EQ(controller_report.end, ControllerRunEnd::kPlantEnded);
-  EXPECT_EQ(loop.steps(), kSamples);
-  expect_plant_record(record, in_process.samples);
-
-  telemetry_v1 sample;
-  std::size_t k = 0;
-  for (; ring->pop(sample); ++k) {
-    for (std::size_t j = 0; j < kJoints; ++j) {
-      ASSERT_EQ(sample.seq, static_cast<std::int64_t>(k));
-      ASSERT_EQ(sample.estimated_speed_rad_s[j], in_process.samples["estimated_speed_rad_s"].values[k * kJoints + j]);
-      ASSERT_EQ(sample.measured_speed_rad_s[j], in_process.samples["measured_speed_rad_s"].values[k * kJoints + j]);
-      ASSERT_EQ(sample.applied_torque_nm[j], in_process.samples["torque_applied_nm"].values[k * kJoints + j]);
-    }
-  }
-  EXPECT_EQ(k, static_cast<std::size_t>(kSamples));
-}
-
-INSTANTIATE_TEST_SUITE_P(Loop, EveryLaw, ::testing::Values("dob-acceleration", "dob-torque", "pid", "ctc", "ctc-dob"),
-                         [](const auto& kind) {
-                           std::string name = kind.param;
-                           std::replace(name.begin(), name.end(), '-', '_');
-                           return name;
-                         });
-
-TEST(PlantLoop, when_the_first_copy_of_every_measurement_is_lost_expect_the_same_samples) {
-  constexpr std::int64_t kSamples = 5;
-  const Artifact law = artifact();
-  const Scenario experiment = scenario(kSamples);
-  Controller controller(law);
-  const RunRecord in_process = run_closed_loop(experiment, controller, trajectory());
-
-  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
-  std::thread thread([&, link = controller_end.get()] {
-    ControlLoop loop(law, trajectory(), {});
-    measurement_v1 received{};
-    std::int64_t lost = -1;
-    for (std::int64_t answered = 0; answered < kSamples && link->receive(kPatience);) {
-      if (!link->take(received)) {
-        continue;
-      }
-      if (received.seq > lost) {
-        lost = received.seq;
-        continue;
-      }
-      loop.handle(received, at(received.seq));
-      link->send(loop.command());
-      ++answered;
-    }
-  });
-  PlantSession session(experiment, kSamplePeriod);
-  Record record;
-  const std::atomic<bool> stop{false};
-  const PlantRunReport report = run_plant(session, *plant_end, {}, &record, stop);
-  thread.join();
-  EXPECT_EQ(report.end, PlantRunEnd::kCompleted);
-  EXPECT_EQ(report.repeated, kSamples);
-  expect_plant_record(record, in_process.samples);
-}
-
-TEST(PlantLoop, when_no_controller_answers_expect_an_end_after_the_timeout) {
-  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
-  PlantSession session(scenario(10), kSamplePeriod);
-  PlantRunSettings settings;
-  settings.timeout_s = 0.1;
-  const std::atomic<bool> stop{false};
-  EXPECT_EQ(run_plant(session, *plant_end, settings, nullptr, stop).end, PlantRunEnd::kControllerNeverHeard);
-  EXPECT_EQ(session.seq(), 0);
-}
-
-TEST(PlantLoop, when_commands_stop_in_real_time_expect_the_torque_held_for_20_ms_and_then_the_brake) {
-  constexpr std::int64_t kAnswered = 10;
-  constexpr std::int64_t kSamples = 60;
-  const Scenario experiment = scenario(kSamples);
-  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
-  std::thread thread([link = controller_end.get()] {
-    measurement_v1 received{};
-    for (std::int64_t newest = 0; newest < kAnswered && link->receive(kPatience);) {
-      if (link->take(received)) {
-        newest = received.seq;
-        command_v1 command{};
-        command.seq = received.seq;
-        command.torque_nm[0] = 5.0;
-        link->send(command);
-      }
-    }
-  });
-  PlantSession session(experiment, kSamplePeriod);
-  PlantRunSettings settings;
-  settings.pace = Pace::kRealTime;
-  settings.brake_nm_s = viscous_brake(experiment, 0.05);
-  Record record;
-  const std::atomic<bool> stop{false};
-  const PlantRunReport report = run_plant(session, *plant_end, settings, &record, stop);
-  thread.join();
-
-  ASSERT_EQ(report.samples, kSamples);
-  EXPECT_TRUE(report.watchdog_at_end);
-  const std::vector<double>& delay = record["command_delay_s"].values;
-  std::size_t last = kSamples - 1;
-  while (delay[last] < 0.0) {
-    --last;
-  }
-  const auto torque = [&record](std::size_t k, std::size_t j) { return record["torque_nm"].values[k * kJoints + j]; };
-  const double held_until = static_cast<double>(last) * kSamplePeriod + delay[last] + 0.02;
-  std::int64_t braked = 0;
-  for (std::size_t k = last + 1; k < kSamples; ++k) {
-    const bool held = static_cast<double>(k + 1) * kSamplePeriod <= held_until + 1e-12;
-    braked += held ? 0 : 1;
-    for (std::size_t j = 0; j < kJoints; ++j) {
-      const double speed = record["speed_rad_s"].values[k * kJoints + j];
-      ASSERT_EQ(torque(k, j), held ? torque(last, j) : -settings.brake_nm_s[j] * speed) << "sample " << k;
-    }
-  }
-  EXPECT_EQ(report.watchdog_samples, braked);
-  EXPECT_GT(braked, 0);
-}
-
-TEST(PlantLoop, brakes_each_joint_with_the_time_constant_asked_for) {
-  // A point mass m at distance l: inertia m l^2, so b = m l^2 / tau.
-  Scenario pendulum = scenario(10);
-  pendulum.plant = ::quasilpv::testing::point_pendulum(0.7);
-  pendulum.external_torque.clear();
-  EXPECT_NEAR(viscous_brake(pendulum, 0.05)[0], 0.49 / 0.05, 1e-9);
 }
 
 TEST(ControlLoop, when_artifact_and_trajectory_differ_in_joints_expect_refusal) {

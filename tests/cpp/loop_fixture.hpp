@@ -1,0 +1,70 @@
+// One small experiment for the tests of both loops: law, reference, plant, messages.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+
+#include "arm_fixtures.hpp"
+#include "artifact_fixture.hpp"
+#include "quasilpv/loop.hpp"
+#include "quasilpv/realtime.hpp"
+#include "quasilpv/scenario.hpp"
+#include "quasilpv/trajectory.hpp"
+
+namespace quasilpv::testing {
+
+inline constexpr int kJoints = 3;
+inline constexpr std::int64_t kMillisecond = kNanosecondsPerMillisecond;
+inline constexpr std::int64_t kPatience = 5 * kNanosecondsPerSecond;
+inline const JointArray kStart{0.3, -0.2, 0.4};
+
+/// Minimum-jerk motion of all joints by 0.2 rad in 1 s, from kStart.
+inline Trajectory trajectory() {
+  Json segment = Json::array();
+  for (int j = 0; j < kJoints; ++j) {
+    segment.push_back({kStart[static_cast<std::size_t>(j)], 0.0, 0.0, 2.0, -3.0, 1.2});
+  }
+  const Json table = {{"schema", "quasilpv.trajectory"},
+                      {"schema_version", 1},
+                      {"name", "minimum-jerk"},
+                      {"joints", kJoints},
+                      {"task", nullptr},
+                      {"knots_s", {0.0, 1.0}},
+                      {"coefficients", Json::array({segment})}};
+  return Trajectory::parse(json_twin(table), "test");
+}
+
+inline Artifact artifact(const std::string& kind = "dob-acceleration") {
+  return Artifact::parse(json_twin(artifact_table(kind, kJoints)), "test");
+}
+
+/// Every imperfection on: a difference in the order of calls or in the number of noise samples shows.
+inline Scenario scenario(std::int64_t samples) {
+  Scenario scenario;
+  scenario.name = "test";
+  scenario.duration_s = static_cast<double>(samples) * kSamplePeriod;
+  scenario.plant = three_link_arm(0.5);
+  scenario.external_torque = {{1, 20.0, 15.0, 0.3}};
+  scenario.sensors = {20, 0.05, 7};
+  scenario.transport_delay_s = 0.3 * kSamplePeriod;
+  scenario.initial_angle = kStart;
+  return scenario;
+}
+
+inline WireIdentity identity_of(const Artifact& artifact) { return {11, artifact.hash_prefix(), artifact.joints()}; }
+
+inline measurement_v1 measurement(std::int64_t seq, const JointArray& angle = kStart) {
+  measurement_v1 message{};
+  message.seq = seq;
+  std::copy(angle.begin(), angle.end(), message.angle_rad);
+  return message;
+}
+
+inline SampleConditions at(std::int64_t seq) {
+  SampleConditions conditions;
+  conditions.now_ns = seq * kMillisecond;
+  return conditions;
+}
+
+}  // namespace quasilpv::testing

@@ -1,0 +1,196 @@
+// The plant's side of a run: over a link it must be the in-process run, and silence must end in the brake.
+#include "quasilpv/plant_loop.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "loop_fixture.hpp"
+#include "quasilpv/in_process_link.hpp"
+#include "quasilpv/run_controller.hpp"
+#include "quasilpv/simulation.hpp"
+
+namespace quasilpv {
+namespace {
+
+using ::quasilpv::testing::artifact;
+using ::quasilpv::testing::at;
+using ::quasilpv::testing::identity_of;
+using ::quasilpv::testing::kJoints;
+using ::quasilpv::testing::kPatience;
+using ::quasilpv::testing::kSamplePeriod;
+using ::quasilpv::testing::scenario;
+using ::quasilpv::testing::trajectory;
+
+void expect_equal_columns(const Record& record, const Record& expected, const std::string& name,
+                          const std::string& expected_name) {
+  const std::vector<double>& values = record[name].values;
+  const std::vector<double>& others = expected[expected_name].values;
+  ASSERT_EQ(values.size(), others.size()) << name;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    ASSERT_EQ(values[i], others[i]) << name << " value " << i;
+  }
+}
+
+void expect_plant_record(const Record& record, const Record& in_process) {
+  for (const char* name : {"time_s", "angle_rad", "speed_rad_s", "acceleration_rad_s2", "external_torque_nm"}) {
+    expect_equal_columns(record, in_process, name, name);
+  }
+  expect_equal_columns(record, in_process, "torque_nm", "torque_applied_nm");
+}
+
+class EveryLaw : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(EveryLaw, gives_over_a_link_in_lock_step_the_samples_of_the_in_process_run_bit_for_bit) {
+  constexpr std::int64_t kSamples = 400;
+  const Artifact law = artifact(GetParam());
+  const Scenario experiment = scenario(kSamples);
+  Controller controller(law);
+  const RunRecord in_process = run_closed_loop(experiment, controller, trajectory());
+
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
+  ControlLoop loop(law, trajectory(), {});
+  auto ring = std::make_unique<TelemetryPublisher::Ring>();
+  const std::atomic<bool> stop{false};
+  ControllerRunReport controller_report;
+  std::thread thread(
+      [&, link = controller_end.get()] { controller_report = run_controller(loop, *link, ring.get(), {}, stop); });
+  PlantSession session(experiment, kSamplePeriod);
+  Record record;
+  const PlantRunReport plant_report = run_plant(session, *plant_end, {}, &record, stop);
+  thread.join();
+
+  EXPECT_EQ(plant_report.end, PlantRunEnd::kCompleted);
+  EXPECT_EQ(plant_report.samples, kSamples);
+  EXPECT_EQ(controller_report.end, ControllerRunEnd::kPlantEnded);
+  EXPECT_EQ(loop.steps(), kSamples);
+  expect_plant_record(record, in_process.samples);
+
+  telemetry_v1 sample;
+  std::size_t k = 0;
+  for (; ring->pop(sample); ++k) {
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      ASSERT_EQ(sample.seq, static_cast<std::int64_t>(k));
+      ASSERT_EQ(sample.estimated_speed_rad_s[j], in_process.samples["estimated_speed_rad_s"].values[k * kJoints + j]);
+      ASSERT_EQ(sample.measured_speed_rad_s[j], in_process.samples["measured_speed_rad_s"].values[k * kJoints + j]);
+      ASSERT_EQ(sample.applied_torque_nm[j], in_process.samples["torque_applied_nm"].values[k * kJoints + j]);
+    }
+  }
+  EXPECT_EQ(k, static_cast<std::size_t>(kSamples));
+}
+
+INSTANTIATE_TEST_SUITE_P(Loop, EveryLaw, ::testing::Values("dob-acceleration", "dob-torque", "pid", "ctc", "ctc-dob"),
+                         [](const auto& kind) {
+                           std::string name = kind.param;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
+
+TEST(PlantLoop, when_the_first_copy_of_every_measurement_is_lost_expect_the_same_samples) {
+  constexpr std::int64_t kSamples = 5;
+  const Artifact law = artifact();
+  const Scenario experiment = scenario(kSamples);
+  Controller controller(law);
+  const RunRecord in_process = run_closed_loop(experiment, controller, trajectory());
+
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
+  std::thread thread([&, link = controller_end.get()] {
+    ControlLoop loop(law, trajectory(), {});
+    measurement_v1 received{};
+    std::int64_t lost = -1;
+    for (std::int64_t answered = 0; answered < kSamples && link->receive(kPatience);) {
+      if (!link->take(received)) {
+        continue;
+      }
+      if (received.seq > lost) {
+        lost = received.seq;
+        continue;
+      }
+      loop.handle(received, at(received.seq));
+      link->send(loop.command());
+      ++answered;
+    }
+  });
+  PlantSession session(experiment, kSamplePeriod);
+  Record record;
+  const std::atomic<bool> stop{false};
+  const PlantRunReport report = run_plant(session, *plant_end, {}, &record, stop);
+  thread.join();
+  EXPECT_EQ(report.end, PlantRunEnd::kCompleted);
+  EXPECT_EQ(report.repeated, kSamples);
+  expect_plant_record(record, in_process.samples);
+}
+
+TEST(PlantLoop, when_no_controller_answers_expect_an_end_after_the_timeout) {
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
+  PlantSession session(scenario(10), kSamplePeriod);
+  PlantRunSettings settings;
+  settings.timeout_s = 0.1;
+  const std::atomic<bool> stop{false};
+  EXPECT_EQ(run_plant(session, *plant_end, settings, nullptr, stop).end, PlantRunEnd::kControllerNeverHeard);
+  EXPECT_EQ(session.seq(), 0);
+}
+
+TEST(PlantLoop, when_commands_stop_in_real_time_expect_the_torque_held_for_20_ms_and_then_the_brake) {
+  constexpr std::int64_t kAnswered = 10;
+  constexpr std::int64_t kSamples = 60;
+  const Scenario experiment = scenario(kSamples);
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
+  std::thread thread([link = controller_end.get()] {
+    measurement_v1 received{};
+    for (std::int64_t newest = 0; newest < kAnswered && link->receive(kPatience);) {
+      if (link->take(received)) {
+        newest = received.seq;
+        command_v1 command{};
+        command.seq = received.seq;
+        command.torque_nm[0] = 5.0;
+        link->send(command);
+      }
+    }
+  });
+  PlantSession session(experiment, kSamplePeriod);
+  PlantRunSettings settings;
+  settings.pace = Pace::kRealTime;
+  settings.brake_nm_s = viscous_brake(experiment, 0.05);
+  Record record;
+  const std::atomic<bool> stop{false};
+  const PlantRunReport report = run_plant(session, *plant_end, settings, &record, stop);
+  thread.join();
+
+  ASSERT_EQ(report.samples, kSamples);
+  EXPECT_TRUE(report.watchdog_at_end);
+  const std::vector<double>& delay = record["command_delay_s"].values;
+  std::size_t last = kSamples - 1;
+  while (delay[last] < 0.0) {
+    --last;
+  }
+  const auto torque = [&record](std::size_t k, std::size_t j) { return record["torque_nm"].values[k * kJoints + j]; };
+  const double held_until = static_cast<double>(last) * kSamplePeriod + delay[last] + 0.02;
+  std::int64_t braked = 0;
+  for (std::size_t k = last + 1; k < kSamples; ++k) {
+    const bool held = static_cast<double>(k + 1) * kSamplePeriod <= held_until + 1e-12;
+    braked += held ? 0 : 1;
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      const double speed = record["speed_rad_s"].values[k * kJoints + j];
+      ASSERT_EQ(torque(k, j), held ? torque(last, j) : -settings.brake_nm_s[j] * speed) << "sample " << k;
+    }
+  }
+  EXPECT_EQ(report.watchdog_samples, braked);
+  EXPECT_GT(braked, 0);
+}
+
+TEST(PlantLoop, brakes_each_joint_with_the_time_constant_asked_for) {
+  // A point mass m at distance l: inertia m l^2, so b = m l^2 / tau.
+  Scenario pendulum = scenario(10);
+  pendulum.plant = ::quasilpv::testing::point_pendulum(0.7);
+  pendulum.external_torque.clear();
+  EXPECT_NEAR(viscous_brake(pendulum, 0.05)[0], 0.49 / 0.05, 1e-9);
+}
+
+}  // namespace
+}  // namespace quasilpv
