@@ -17,7 +17,7 @@ def list_command(json: JsonOption = False) -> None:
     """
     known = {
         "robots": [{"id": robot.id, "summary": robot.summary} for robot in robots()],
-        "controllers": [{"id": name, "summary": summary} for name, summary in CONTROLLERS.items()],
+        "controllers": [{"id": name, "summary": kind.summary} for name, kind in CONTROLLERS.items()],
         "scenarios": [{"id": task.id, "summary": task.summary, "robot": task.robot} for task in tracking_tasks()],
     }
     if json:

@@ -12,13 +12,14 @@ from quasilpv.errors import InputError
 from quasilpv.experiments.designs import kept_design
 from quasilpv.experiments.result import Variant
 from quasilpv.scenarios import ENCODER_BITS, Sensors
-from quasilpv.synthesis import CONTROLLERS, Specification
+from quasilpv.synthesis import CONTROLLERS, Specification, controller_kind
 from quasilpv.synthesis.acceleration_design import Progress
 
 SHORT_NAMES = {"acceleration": "dob-acceleration", "torque": "dob-torque"}
 
 RateOption: TypeAlias = Annotated[
-    float | None, typer.Option("--rate-hz", help="Sample rate; the controller is designed for it.  [default: 1000]")
+    float | None,
+    typer.Option("--rate-hz", help="Sample rate; the controller is designed for it.  [default: 1000, dob-torque 4000]"),
 ]
 EncoderOption: TypeAlias = Annotated[
     int | None,
@@ -83,6 +84,7 @@ def require_controller(controller: str) -> str:
 
 
 def specification(
+    controller: str,
     rate_hz: float | None,
     encoder_bits: int | None,
     margin_spare: float | None = None,
@@ -90,12 +92,14 @@ def specification(
 ) -> Specification:
     """The specification for these numbers; what is not given, and exact angles (0 bits), keep their default.
 
+    The default rate is the controller's own.
+
     Raises:
         InputError: out of range.
     """
     defaults = Specification()
     return Specification(
-        rate_hz=defaults.rate_hz if rate_hz is None else rate_hz,
+        rate_hz=controller_kind(controller).rate_hz if rate_hz is None else rate_hz,
         encoder_bits=encoder_bits or defaults.encoder_bits,
         margin_spare=defaults.margin_spare if margin_spare is None else margin_spare,
         torque_activity=defaults.torque_activity if torque_activity is None else torque_activity,
@@ -107,7 +111,7 @@ def designed(robot_id: str, variant: Variant, rate_hz: float | None, progress: P
     return kept_design(
         robot_id,
         variant.controller,
-        specification(rate_hz, variant.encoder_bits),
+        specification(variant.controller, rate_hz, variant.encoder_bits),
         disturbance_compensation=variant.compensated,
         progress=progress,
     )

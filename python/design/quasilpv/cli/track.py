@@ -21,7 +21,6 @@ from quasilpv.cli.options import (
     plant_kind,
     require_controller,
     sensors_of,
-    specification,
 )
 from quasilpv.cli.results import print_results
 from quasilpv.errors import InputError
@@ -31,7 +30,7 @@ from quasilpv.figures.gallery import write_comparison, write_gallery
 from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
-DEFAULT_CONTROLLERS = ("pid", "ctc", "ctc-dob", "dob-acceleration")
+DEFAULT_CONTROLLERS = ("pid", "ctc", "ctc-dob", "dob-torque", "dob-acceleration")
 COARSE_ENCODER_BITS = 17
 PATH_ROBOT = "arm3"
 
@@ -41,7 +40,7 @@ class _Session:
     """What all runs of one command have in common."""
 
     given: Artifact | None
-    rate_hz: float
+    rate_hz: float | None
     plant: PlantKind
     out: Path
 
@@ -98,7 +97,7 @@ def track_command(
         raise InputError("command line", "SCENARIO", "nothing", "at least one scenario id or --trajectory FILE")
     given = None if artifact is None else _given(artifact, controllers, rate_hz, no_compensation)
     variants = _variants(given, controllers, encoder_bits, no_compensation)
-    session = _Session(given, specification(rate_hz, None).rate_hz, cast(PlantKind, plant_kind(plant)), out)
+    session = _Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out)
     results = []
     with progress(len(experiments) * len(variants)) as steps:
         for experiment in experiments:

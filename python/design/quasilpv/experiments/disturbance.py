@@ -18,6 +18,7 @@ def true_disturbance(run: Run, artifact: Artifact, runtime: _runtime.Artifact) -
     """The disturbance that the law's estimate should equal, or ``None`` if it estimates none.
 
     * ``dob-acceleration``: ``a_d = theta'' - M_n(z)^-1 (Gamma - G(theta))``, rad/s^2;
+    * ``dob-torque``: ``d = M_n(z) theta'' + G(theta) - Gamma``, N m;
     * ``ctc-dob``: ``d = M_n(z) theta'' + N(theta, w) w + G(theta) - Gamma``, N m;
 
     with the design model of the artifact at the true angles and speeds.
@@ -28,7 +29,7 @@ def true_disturbance(run: Run, artifact: Artifact, runtime: _runtime.Artifact) -
         runtime: the same as the run-time side loaded it.
     """
     kind = artifact.law.kind
-    if kind not in ("dob-acceleration", "ctc-dob"):
+    if kind not in ("dob-acceleration", "dob-torque", "ctc-dob"):
         return None
     angle, speed = run.true_angle_rad.T, run.true_speed_rad_s.T
     gravity = evaluate(artifact.programs["gravity"], angle).T
@@ -39,6 +40,7 @@ def true_disturbance(run: Run, artifact: Artifact, runtime: _runtime.Artifact) -
     if kind == "dob-acceleration":
         known = np.linalg.solve(inertia, (torque - gravity)[..., None])[..., 0]
         return Disturbance(acceleration - known, "rad/s²", "acceleration")
-    coriolis = evaluate(artifact.programs["coriolis"], angle, speed).T
-    inertial: FloatArray = np.einsum("kij,kj->ki", inertia, acceleration)
-    return Disturbance(inertial + coriolis + gravity - torque, "N m", "torque")
+    unknown: FloatArray = np.einsum("kij,kj->ki", inertia, acceleration) + gravity - torque
+    if kind == "ctc-dob":
+        unknown = unknown + evaluate(artifact.programs["coriolis"], angle, speed).T
+    return Disturbance(unknown, "N m", "torque")

@@ -1,9 +1,12 @@
 """From a robot and a specification to the numbers of a tracking law.
 
-A new law is one new file and one line in `CONTROLLERS`.
+A new law is one new file and one entry of `CONTROLLERS`.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 from quasilpv.errors import InputError
 from quasilpv.synthesis import baselines
@@ -14,17 +17,53 @@ from quasilpv.synthesis.torque_law import torque_law
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import Robot
 
-CONTROLLERS = {
-    "pid": "PID with feedforward, gains of Dehak 2022 (III.55), measured speeds",
-    "ctc": "computed torque, gains of Dehak 2022 (III.57), measured speeds",
-    "ctc-dob": "computed torque with a disturbance observer (Mohammadi et al. 2013), measured speeds",
-    "dob-torque": "disturbance-observer tracking at the torque level (Dehak 2022, Theorem IV.11), positions only",
-    "dob-acceleration": "disturbance-observer tracking at the acceleration level, positions only (default)",
+
+@dataclass(frozen=True)
+class ControllerKind:
+    """An entry of the registry of controllers.
+
+    Attributes:
+        summary: one line for a listing.
+        design: from robot and specification to a design.
+        rate_hz: sample rate if nobody asks for another.
+    """
+
+    summary: str
+    design: Callable[[Robot, Specification, Progress], TrackingDesign]
+    rate_hz: float = 1000.0
+
+
+CONTROLLERS: Mapping[str, ControllerKind] = {
+    "pid": ControllerKind("PID with feedforward, gains of Dehak 2022 (III.55), measured speeds", baselines.pid),
+    "ctc": ControllerKind("computed torque, gains of Dehak 2022 (III.57), measured speeds", baselines.computed_torque),
+    "ctc-dob": ControllerKind(
+        "computed torque with a disturbance observer (Mohammadi et al. 2013), measured speeds",
+        baselines.computed_torque_with_observer,
+    ),
+    "dob-torque": ControllerKind(
+        "disturbance-observer tracking at the torque level (Dehak 2022, Theorem IV.11), positions only",
+        torque_law,
+        rate_hz=4000.0,
+    ),
+    "dob-acceleration": ControllerKind(
+        "disturbance-observer tracking at the acceleration level, positions only (default)", acceleration_law
+    ),
 }
 
 DEFAULT_CONTROLLER = "dob-acceleration"
 
-__all__ = ["CONTROLLERS", "DEFAULT_CONTROLLER", "Specification", "TrackingDesign", "synthesise"]
+__all__ = ["CONTROLLERS", "DEFAULT_CONTROLLER", "Specification", "TrackingDesign", "controller_kind", "synthesise"]
+
+
+def controller_kind(controller: str) -> ControllerKind:
+    """The controller of that name.
+
+    Raises:
+        InputError: there is none; the message lists those there are.
+    """
+    if controller not in CONTROLLERS:
+        raise InputError("controllers", "controller", controller, f"one of {', '.join(CONTROLLERS)}")
+    return CONTROLLERS[controller]
 
 
 def synthesise(
@@ -40,22 +79,21 @@ def synthesise(
     Args:
         robot: from the registry of robots.
         controller: one of `CONTROLLERS`.
-        specification: what is asked for (default: `Specification()`); baselines use its sample rate only.
-        disturbance_compensation: of `dob-acceleration`.
+        specification: what is asked for (default: that of `Specification`, at the controller's own rate); baselines use
+            its sample rate only.
+        disturbance_compensation: False leaves the observed disturbance out of the torque of `dob-acceleration`, to show
+            what it is worth.
         progress: called with (points done, points in all).
 
     Raises:
-        InputError: unknown controller, or compensation switched off for a law that has none.
+        InputError: unknown controller, or compensation switched off for a law that cannot do without.
         InfeasibleError: no design meets the specification.
     """
-    wanted = specification or Specification()
-    if controller not in CONTROLLERS:
-        raise InputError("controllers", "controller", controller, f"one of {', '.join(CONTROLLERS)}")
-    if controller == "dob-acceleration":
-        return acceleration_law(robot, wanted, progress, disturbance_compensation)
-    if not disturbance_compensation:
+    kind = controller_kind(controller)
+    design = kind.design(robot, specification or Specification(rate_hz=kind.rate_hz), progress)
+    if disturbance_compensation:
+        return design
+    if "disturbance_compensation" not in design.law:
         raise InputError(controller, "disturbance_compensation", "off", "dob-acceleration, the law that has it")
-    if controller == "dob-torque":
-        return torque_law(robot, wanted, progress)
-    fixed = {"pid": baselines.pid, "ctc": baselines.computed_torque, "ctc-dob": baselines.computed_torque_with_observer}
-    return fixed[controller](robot, wanted)
+    without = {"disturbance_compensation": False}
+    return replace(design, law={**design.law, **without}, inputs={**design.inputs, **without})

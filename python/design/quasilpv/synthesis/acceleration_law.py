@@ -11,19 +11,13 @@ from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, pr
 from quasilpv.systems.registry import Robot
 
 
-def acceleration_law(
-    robot: Robot,
-    specification: Specification,
-    progress: Progress = no_progress,
-    disturbance_compensation: bool = True,
-) -> TrackingDesign:
+def acceleration_law(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
     """Design `dob-acceleration`.
 
     Args:
         robot: what it is for.
         specification: what is asked for.
         progress: called with (points done, points in all).
-        disturbance_compensation: False leaves the observed disturbance out of the torque (to show what it is worth).
 
     Raises:
         InfeasibleError: no design meets the specification.
@@ -36,7 +30,7 @@ def acceleration_law(
         "feedback": {"kp": kp, "kd": kd, "ki": ki},
         "observer": [float(gain) for gain in scalars.observer],
         "filter_time_constant_s": scalars.filter_time_constant_s,
-        "disturbance_compensation": disturbance_compensation,
+        "disturbance_compensation": True,
         "inertia": inertia_table(robot, design.candidate.inertia_scale),
     }
     return TrackingDesign(
@@ -45,11 +39,7 @@ def acceleration_law(
         sample_period_s=specification.sample_period_s,
         law=law,
         expressions=premise_and_gravity(robot),
-        inputs={
-            "controller": "dob-acceleration",
-            "specification": specification.to_document(),
-            "disturbance_compensation": disturbance_compensation,
-        },
+        inputs={"controller": "dob-acceleration", "specification": specification.to_document()},
         report=design.report(),
         witness=_witness(design),
     )

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.registry import Robot
@@ -29,7 +30,7 @@ conditionally stable: slower observers saturate the actuators on the default sce
 multiple of 50 that does not; its torque activity is about that of the default design."""
 
 
-def pid(robot: Robot, specification: Specification) -> TrackingDesign:
+def pid(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
     """PID with feedforward: ``kp = 3 a w^2``, ``kd = 3 a w``, ``ki = a w^3``, a the largest diagonal inertia.
 
     Every diagonal entry of the inertia of a serial arm is largest where all cosines are 1.
@@ -49,12 +50,14 @@ def pid(robot: Robot, specification: Specification) -> TrackingDesign:
     return _design(robot, specification, law, {"coriolis_reference": tuple(symbolic.coriolis * speeds)})
 
 
-def computed_torque(robot: Robot, specification: Specification) -> TrackingDesign:
+def computed_torque(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
     """Computed torque without disturbance observer."""
     return _computed_torque(robot, specification, "ctc", 0.0)
 
 
-def computed_torque_with_observer(robot: Robot, specification: Specification) -> TrackingDesign:
+def computed_torque_with_observer(
+    robot: Robot, specification: Specification, progress: Progress = no_progress
+) -> TrackingDesign:
     """Computed torque with a disturbance observer of `DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S`."""
     return _computed_torque(robot, specification, "ctc-dob", DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S)
 
