@@ -6,7 +6,8 @@
 
 namespace quasilpv {
 
-/// Bad input: a file, field or argument is not what it must be. `what()` is one line: "<source>: <field>: got <got>, expected <expected>".
+/// Bad input: a file, field or argument is not what it must be. `what()` is one line: "<source>: <field>: got <got>,
+/// expected <expected>".
 class InputError : public std::runtime_error {
  public:
   InputError(const std::string& source, const std::string& field, const std::string& got, const std::string& expected)

@@ -16,7 +16,8 @@ class Trajectory {
   static Trajectory load(const std::string& path);
   static Trajectory parse(std::string_view bytes, const std::string& source);
 
-  /// RT-SAFE (bounded: binary search over the knots). Before 0 the first angles at rest, after the end the last angles at rest.
+  /// RT-SAFE (bounded: binary search over the knots). Before 0 the first angles at rest, after the end the last angles
+  /// at rest.
   Reference evaluate(double time_s) const noexcept;
 
   int joints() const noexcept { return joints_; }
