@@ -40,6 +40,6 @@ def verify(document: Mapping[str, Any], source: str = "artifact") -> Verificatio
         raise InputError(source, "law.kind", kind, f"one with a certificate: {', '.join(CHECKERS)}")
     try:
         claims = CHECKERS[kind](document)
-    except (KeyError, TypeError, ValueError, ZeroDivisionError) as error:
+    except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise InputError(source, "witness", f"{type(error).__name__}: {error}", f"what {kind} needs") from error
     return Verification(claims, time.perf_counter() - start)
