@@ -17,7 +17,7 @@ import pytest
 from quasilpv.artifact.canonical import canonical_json, parse_document, with_hash
 from quasilpv.cli import run
 
-VERBS = ("list", "synth", "inspect", "track", "hil")
+VERBS = ("list", "synth", "inspect", "verify", "robust", "track", "hil")
 ROW = {
     "scenario": str,
     "controller": str,
@@ -186,7 +186,18 @@ def test_when_the_output_cannot_be_written_expect_one_line_and_nothing_half_writ
     assert not [path for path in tmp_path.iterdir() if path.name not in ("file", "out")]
 
 
-@pytest.mark.parametrize("junk", [b"", b"\x7fELF\x02\x01", b"{", b"\xbf\xff", b"null", os.urandom(64), b"{}" * 1000])
+JUNK = {
+    "empty": b"",
+    "an executable": b"\x7fELF\x02\x01",
+    "half an object": b"{",
+    "an endless CBOR map": b"\xbf\xff",
+    "null": b"null",
+    "random bytes": np.random.default_rng(5).bytes(64),
+    "many objects": b"{}" * 1000,
+}
+
+
+@pytest.mark.parametrize("junk", JUNK.values(), ids=JUNK.keys())
 def test_when_the_artifact_is_junk_expect_one_line_and_exit_2(design: Design, tmp_path: Path, junk: bytes) -> None:
     (tmp_path / "junk.json").write_bytes(junk)
     assert_refused(design("inspect", "junk.json"), "junk.json")

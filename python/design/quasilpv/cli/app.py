@@ -37,6 +37,7 @@ Examples:
   design list
   design synth arm3 -o out/arm3
   design inspect out/arm3/artifact.json
+  design verify out/arm3/artifact.json
   design robust out/arm3/artifact.json
   design track serial-square serial-circle
   design hil serial-square --real-time
