@@ -93,7 +93,7 @@ def checked_artifact(design: TrackingDesign, allow_unverified: bool = False) -> 
     if failures and not allow_unverified:
         more = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
         raise ClaimError(f"{content['name']}: not released: {failures[0]}{more}")
-    evidence = {**content["verification"], "certificate": verdict.findings(), "gate": gate}
+    evidence = {**(content["verification"] or {}), "certificate": verdict.findings(), "gate": gate}
     if failures:
         evidence["released_unverified"] = True
     return Artifact.from_document({**content, "verification": evidence})
