@@ -274,13 +274,14 @@ def test_when_nothing_is_chosen_expect_all_default_controllers_and_a_coarse_enco
         ("pid", 20),
         ("ctc", 20),
         ("ctc-dob", 20),
+        ("dob-torque", 20),
         ("dob-acceleration", 20),
         ("dob-acceleration", 17),
     ]
     assert all(
         (row["worst_growth_rate_per_s"] is None) == (row["controller"] in ("pid", "ctc", "ctc-dob")) for row in rows
     )
-    assert len(list((tmp_path / "out/cache").iterdir())) == 5
+    assert len(list((tmp_path / "out/cache").iterdir())) == 6
 
 
 def test_when_an_artifact_and_figures_are_asked_for_expect_one_row_and_the_figures(
