@@ -9,9 +9,11 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from quasilpv.lmi import clarabel_backend
+from quasilpv.lmi import backends
+from quasilpv.lmi.backends import BackendName
 from quasilpv.lmi.exact import Matrix, is_positive_definite, symmetric_part, to_rational
 from quasilpv.lmi.expressions import Expression, Operand, Variable, as_expression, identity
+from quasilpv.lmi.raw_solution import RawSolution
 
 
 class Outcome(Enum):
@@ -113,12 +115,20 @@ class Problem:
             raise ValueError(f"the objective is 1 x 1, got {scalar.shape}")
         self._objective = scalar
 
-    def solve(self) -> Solution:
-        """Solve as stated. An optimum lies on the boundary of the feasible set: use `solve_inside` for gains."""
-        raw = clarabel_backend.solve(self._constraints, self._objective, self.variables)
-        return self._judge(raw)
+    def solve(self, *, backend: BackendName = "clarabel", solver: str | None = None) -> Solution:
+        """Solve as stated. An optimum lies on the boundary of the feasible set: use `solve_inside` for gains.
 
-    def solve_inside(self, back_off: float = 0.05) -> Solution:
+        Args:
+            backend, solver: what solves it, see `backends.solve`.
+
+        Raises:
+            ValueError: there is no such back end or solver.
+        """
+        return self._judge(backends.solve(self._constraints, self._objective, self.variables, backend, solver))
+
+    def solve_inside(
+        self, back_off: float = 0.05, *, backend: BackendName = "clarabel", solver: str | None = None
+    ) -> Solution:
         """Near-optimal point strictly inside the feasible set, so that exact arithmetic can confirm it.
 
         Two stages: the optimum ``v``; then, with the objective allowed up to ``v + back_off |v|``, the largest
@@ -126,8 +136,12 @@ class Problem:
 
         Args:
             back_off: how much of the optimum is given up, relative.
+            backend, solver: what solves it, see `backends.solve`.
+
+        Raises:
+            ValueError: there is no such back end or solver.
         """
-        first = self.solve()
+        first = self.solve(backend=backend, solver=solver)
         if not first.values:
             return first
         margin = Variable("margin", 1)
@@ -141,12 +155,12 @@ class Problem:
             budget = first.objective + back_off * abs(first.objective)
             inner.positive("objective", np.array([[budget]]) - self._objective)
         inner.minimise(-margin)
-        second = clarabel_backend.solve(inner.constraints, inner.objective, inner.variables)
+        second = backends.solve(inner.constraints, inner.objective, inner.variables, backend, solver)
         if not second.values:
             return first
         return self._judge(second)
 
-    def _judge(self, raw: clarabel_backend.RawSolution) -> Solution:
+    def _judge(self, raw: RawSolution) -> Solution:
         if not raw.values:
             outcome = Outcome.INFEASIBLE_NUMERICALLY if raw.infeasible else Outcome.UNKNOWN
             return Solution(outcome, iterations=raw.iterations)

@@ -1,0 +1,43 @@
+"""Which program solves a problem."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
+
+from quasilpv.lmi import clarabel_backend
+from quasilpv.lmi.expressions import Expression, Variable
+from quasilpv.lmi.raw_solution import RawSolution
+
+if TYPE_CHECKING:
+    from quasilpv.lmi.problem import Constraint
+
+BackendName: TypeAlias = Literal["clarabel", "cvxpy"]
+
+
+def solve(
+    constraints: Sequence[Constraint],
+    objective: Expression | None,
+    variables: Sequence[Variable],
+    backend: BackendName,
+    solver: str | None,
+) -> RawSolution:
+    """Minimise the objective subject to every expression being positive semidefinite.
+
+    Args:
+        constraints, objective, variables: the problem.
+        backend: ``"clarabel"`` (assembled directly, fast) or ``"cvxpy"`` (any of its solvers, slow).
+        solver: of cvxpy, by its name there; None for its default.
+
+    Raises:
+        ValueError: unknown back end, a solver for a back end that has no choice, or one that is not installed.
+    """
+    if backend == "clarabel":
+        if solver is not None:
+            raise ValueError(f"solver: got {solver!r}, expected none for the back end clarabel")
+        return clarabel_backend.solve(constraints, objective, variables)
+    if backend == "cvxpy":
+        from quasilpv.lmi import cvxpy_backend  # noqa: PLC0415 -- takes a second to import and is rarely wanted
+
+        return cvxpy_backend.solve(constraints, objective, variables, solver or cvxpy_backend.DEFAULT_SOLVER)
+    raise ValueError(f"backend: got {backend!r}, expected one of {', '.join(get_args(BackendName))}")
