@@ -9,6 +9,7 @@ from quasilpv.experiments.result import TrackResult
 
 COLUMNS = (
     "controller",
+    "rate\nHz",
     "rms X\nmm",
     "rms Y\nmm",
     "max X\nmm",
@@ -24,9 +25,9 @@ def print_results(results: Sequence[TrackResult]) -> None:
     """Print one table per scenario on stdout."""
     for scenario in dict.fromkeys(result.scenario for result in results):
         own = [result for result in results if result.scenario == scenario]
-        rates = sorted({result.rate_hz for result in own})
-        title = f"{scenario}, {own[0].plant} plant, {', '.join(f'{rate:g}' for rate in rates)} Hz"
-        print_table(title, COLUMNS, [cells(result, result.variant.label) for result in own])
+        print_table(
+            f"{scenario}, {own[0].plant} plant", COLUMNS, [cells(result, result.variant.label) for result in own]
+        )
 
 
 def cells(result: TrackResult, label: str) -> list[str]:
@@ -35,6 +36,7 @@ def cells(result: TrackResult, label: str) -> list[str]:
     lengths = (metrics.rms_x_m, metrics.rms_y_m, metrics.mav_x_m, metrics.mav_y_m)
     return [
         label,
+        f"{result.rate_hz:g}",
         *(f"{1e3 * length:.3g}" for length in lengths),
         f"{metrics.rms_torque_nm:.0f}",
         f"{metrics.rms_torque_increment_nm:.0f}",
