@@ -40,7 +40,7 @@ def _plot_distance(axes: Axes, results: Sequence[TrackResult]) -> None:
             color=_colour(result),
             linestyle=dashes,
             linewidth=0.9,
-            label=result.variant.label,
+            label=_label(result),
         )
     axes.set_ylabel("distance from the reference (mm)")
     axes.set_ylim(bottom=_FLOOR_MM)
@@ -58,7 +58,7 @@ def _plot_bars(axes: Axes, results: Sequence[TrackResult]) -> None:
     for y, value, result in zip(position, rms_mm, results, strict=True):
         note = f" {value:.3g} mm, {result.metrics.rms_torque_increment_nm:.3g} N m per sample"
         axes.text(value, y, note, va="center", fontsize=8)
-    axes.set_yticks(position, [result.variant.label for result in results])
+    axes.set_yticks(position, [_label(result) for result in results])
     axes.set_xlim(0.3 * float(rms_mm.min()), 25.0 * float(rms_mm.max()))
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("rms distance from the reference (mm); rms torque increment beside it")
@@ -76,3 +76,7 @@ def _dashes(results: Sequence[TrackResult]) -> list[str | tuple[int, tuple[float
         dashes.append((0, (4.0, 1.5)) if result.variant.controller in seen else "-")
         seen.add(result.variant.controller)
     return dashes
+
+
+def _label(result: TrackResult) -> str:
+    return f"{result.variant.label}, {result.rate_hz / 1e3:g} kHz"
