@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import typer
 
 from quasilpv import __version__
-from quasilpv.cli import hil, inspect, listing, robust, synth, track, verify
+from quasilpv.cli import export_sdp, hil, inspect, listing, robust, synth, track, verify
 from quasilpv.errors import (
     ClaimError,
     FaultStop,
@@ -80,6 +80,7 @@ app.command("synth")(synth.synth_command)
 app.command("inspect")(inspect.inspect_command)
 app.command("verify")(verify.verify_command)
 app.command("robust")(robust.robust_command)
+app.command("export-sdp")(export_sdp.export_sdp_command)
 app.command("track")(track.track_command)
 app.command("hil")(hil.hil_command)
 

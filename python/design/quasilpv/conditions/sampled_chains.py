@@ -78,7 +78,7 @@ def observer_chain(t: float) -> tuple[Matrix, Matrix, Matrix]:
     return transition, to_rational([[h**4 / 24], [h**3 / 6], [h**2 / 2], [h]]), to_rational([[1, 0, 0, 0]])
 
 
-def feedback_gains(bandwidth: float, sample_period_s: float) -> ChainGains:
+def feedback_problem(bandwidth: float, sample_period_s: float) -> tuple[Problem, Variable, Variable]:
     """State feedback ``a = kp e + kd e' + ki int e`` that least amplifies a white disturbance acceleration.
 
     Unknowns ``P = P' > 0`` (3x3), ``Y`` (1x3); ``K = Y P^-1``; minimise ``C P C'`` subject to
@@ -91,7 +91,7 @@ def feedback_gains(bandwidth: float, sample_period_s: float) -> ChainGains:
         sample_period_s: T.
 
     Returns:
-        Gains (kp, kd, ki), all negative: they act on ``x - x_r``.
+        The problem, P and Y.
     """
     transition, drive = feedback_chain(bandwidth * sample_period_s)
     centre, radius = disk_of(bandwidth, sample_period_s, FEEDBACK_DISK)
@@ -103,6 +103,13 @@ def feedback_gains(bandwidth: float, sample_period_s: float) -> ChainGains:
     problem.positive("covariance", block([[P, closed, drive], [None, P, zeros(3, 1)], [None, None, np.array([[1]])]]))
     angle = to_rational([[1, 0, 0]])
     problem.minimise(angle @ P @ angle.T)
+    return problem, P, Y
+
+
+def feedback_gains(bandwidth: float, sample_period_s: float) -> ChainGains:
+    """Gains (kp, kd, ki) from an interior point of `feedback_problem`; all negative: they act on ``x - x_r``."""
+    problem, P, Y = feedback_problem(bandwidth, sample_period_s)
+    centre, radius = disk_of(bandwidth, sample_period_s, FEEDBACK_DISK)
     solution = problem.solve_inside()
     if not solution.values:
         return _no_gains(3, solution, centre, radius)
@@ -111,7 +118,7 @@ def feedback_gains(bandwidth: float, sample_period_s: float) -> ChainGains:
     return ChainGains(gains, solution, solution.values[P], solution.objective, (float(centre), float(radius)))
 
 
-def observer_gains(bandwidth: float, sample_period_s: float) -> ChainGains:
+def observer_problem(bandwidth: float, sample_period_s: float) -> tuple[Problem, Variable, Variable]:
     """Current-estimator gains that trade measurement noise against a moving disturbance.
 
     Estimate ``x+ = A (x + l (y - C x))``, predictor gain ``A l = Q^-1 W``. Unknowns ``Q = Q' > 0`` (4x4), ``W`` (4x1),
@@ -127,7 +134,7 @@ def observer_gains(bandwidth: float, sample_period_s: float) -> ChainGains:
         sample_period_s: T.
 
     Returns:
-        Gains (l1, l2, l3, l4), the same for every joint.
+        The problem, Q and W.
     """
     transition, drive, output = observer_chain(bandwidth * sample_period_s)
     centre, radius = disk_of(bandwidth, sample_period_s, OBSERVER_DISK)
@@ -143,6 +150,14 @@ def observer_gains(bandwidth: float, sample_period_s: float) -> ChainGains:
     problem.positive("variance", block([[Q, inputs], [None, N]]))
     unit = [to_rational([[1, 0]]), to_rational([[0, 1]])]
     problem.minimise(unit[0] @ N @ unit[0].T + unit[1] @ N @ unit[1].T)
+    return problem, Q, W
+
+
+def observer_gains(bandwidth: float, sample_period_s: float) -> ChainGains:
+    """Gains (l1, l2, l3, l4), the same for every joint, from an interior point of `observer_problem`."""
+    problem, Q, W = observer_problem(bandwidth, sample_period_s)
+    transition, _, _ = observer_chain(bandwidth * sample_period_s)
+    centre, radius = disk_of(bandwidth, sample_period_s, OBSERVER_DISK)
     solution = problem.solve_inside()
     if not solution.values:
         return _no_gains(4, solution, centre, radius)

@@ -1,9 +1,9 @@
 """Problems in the SDPA sparse format, the common file format of semidefinite solvers.
 
 The format states ``minimise c'x subject to sum_k x_k F_k - F_0 >= 0``, all F_k block diagonal with the same blocks
-(Fujisawa, Kojima, Nakata, Yamashita 2008, SDPA manual). Here every inequality is one block, and the unknowns are those
-of the variables, one after the other, symmetric ones as their upper triangle, column by column. Doubles are written in
-their shortest form that reads back as the same double. Equally good for one's own solver and for a stranger's check.
+(Fujisawa, Kojima, Nakata and Yamashita 2002, SDPA User's Manual). Here every inequality is one block, and the unknowns
+are those of the variables, one after the other, symmetric ones as their upper triangle, column by column. Doubles are
+written in their shortest form that reads back as the same double.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class SdpaProgram:
         comments = tuple(line[1:].strip() for line in lines if line.startswith(_COMMENT_MARKS))
         body = [line for line in lines if line.strip() and not line.startswith(_COMMENT_MARKS)]
         try:
-            unknowns, count = (int(re.split(r"\D", line.strip(), maxsplit=1)[0]) for line in body[:2])
+            unknowns, count = _leading_number(body[0]), _leading_number(body[1])
             sizes = tuple(abs(int(token)) for token in body[2].translate(_SEPARATORS).split()[:count])
             tokens = " ".join(body[3:]).translate(_SEPARATORS).split()
             objective = tuple(map(float, tokens[:unknowns]))
@@ -142,6 +142,14 @@ def _legend(problem: Problem) -> Iterator[str]:
         form = "symmetric, upper triangle by columns" if v.symmetric else "by columns"
         yield f"unknowns {first} to {first + v.size - 1}: {v.name}, {v.rows} x {v.cols}, {form}"
         first += v.size
+
+
+def _leading_number(line: str) -> int:
+    """The number a line starts with; anything may follow."""
+    found = re.match(r"\s*(\d+)", line)
+    if found is None:
+        raise ValueError(f"{line!r}, a line that starts with no number")
+    return int(found[1])
 
 
 def _parse_entries(tokens: Sequence[str]) -> Iterator[Entry]:
