@@ -109,8 +109,10 @@ def test_when_computed_torque_is_written_expect_the_printed_gains() -> None:
     assert np.allclose(law.gi, 1.0465e5, rtol=5e-5)
 
 
-# dob-torque has the programs of dob-acceleration and takes long to design.
-@pytest.mark.parametrize("controller", [name for name in CONTROLLERS if name != "dob-torque"])
+# dob-torque has the programs of dob-acceleration, a tuned baseline those of the untuned one, and both take longer.
+@pytest.mark.parametrize(
+    "controller", [name for name in CONTROLLERS if name != "dob-torque" and not name.endswith("-tuned")]
+)
 @pytest.mark.parametrize("robot_id", ["arm2", "arm3"])
 def test_when_programs_are_compiled_expect_the_model_they_came_from(robot_id: str, controller: str) -> None:
     model = robot(robot_id).model

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, cast
 
@@ -47,7 +47,9 @@ class _Session:
     def run(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> TrackResult:
         artifact = self.given or designed(experiment.robot.id, variant, self.rate_hz, progress=steps.parts)
         folder = self.out / experiment.name / variant.slug
-        return track(experiment, artifact, folder, plant=self.plant, sensors=sensors_of(variant.encoder_bits))
+        result = track(experiment, artifact, folder, plant=self.plant, sensors=sensors_of(variant.encoder_bits))
+        # A result names the law kind, which several controllers share; of a given artifact it is all there is to say.
+        return result if self.given else replace(result, variant=variant)
 
 
 def track_command(

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from quasilpv.errors import InputError
-from quasilpv.synthesis import baselines
+from quasilpv.synthesis import baselines, tuned_baselines
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.acceleration_law import acceleration_law
 from quasilpv.synthesis.specification import Specification
@@ -39,6 +39,11 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
     "ctc-dob": ControllerKind(
         "computed torque with a disturbance observer (Mohammadi et al. 2013), measured speeds",
         baselines.computed_torque_with_observer,
+    ),
+    "pid-tuned": ControllerKind("pid, tuned as dob-acceleration is", tuned_baselines.pid_tuned),
+    "ctc-tuned": ControllerKind("ctc, tuned as dob-acceleration is", tuned_baselines.computed_torque_tuned),
+    "ctc-dob-tuned": ControllerKind(
+        "ctc-dob, tuned as dob-acceleration is", tuned_baselines.computed_torque_with_observer_tuned
     ),
     "dob-torque": ControllerKind(
         "disturbance-observer tracking at the torque level (Dehak 2022, Theorem IV.11), positions only",

@@ -28,6 +28,8 @@ FEEDBACK_BANDWIDTHS = tuple(float(w) for w in np.geomspace(0.02, 0.28, 12))
 OBSERVER_BANDWIDTHS = tuple(float(w) for w in np.geomspace(0.4, 2.6, 10))
 FILTER_TIMES = (0.3, 0.6, 1.0, 1.5)
 REFINEMENTS = 2
+NEIGHBOURS = 3**3 - 1
+LARGEST_SEARCH = len(FEEDBACK_BANDWIDTHS) * len(OBSERVER_BANDWIDTHS) * len(FILTER_TIMES) + REFINEMENTS * NEIGHBOURS
 INTERIOR_RATIOS = 5
 
 Progress = Callable[[int, int], None]
@@ -178,17 +180,16 @@ def design_acceleration_law(
         noise_nm=quantum / math.sqrt(12.0) * largest_inertia_norm(robot),
     )
     grid = list(product(FEEDBACK_BANDWIDTHS, OBSERVER_BANDWIDTHS, FILTER_TIMES))
-    total = len(grid) + REFINEMENTS * 26
     for point in grid:
         search.visit(*point)
-        progress(search.tried, total)
+        progress(search.tried, LARGEST_SEARCH)
     step = (_ratio(FEEDBACK_BANDWIDTHS), _ratio(OBSERVER_BANDWIDTHS), 1.5)
     for _ in range(REFINEMENTS):
         step = tuple(math.sqrt(s) for s in step)  # type: ignore[assignment]
         if search.best_point is not None:
             for point in _neighbours(search.best_point, step):
                 search.visit(*point)
-                progress(search.tried, total)
+                progress(search.tried, LARGEST_SEARCH)
     if search.best is None or search.best_point is None:
         raise InfeasibleError(_why_not(search))
     wc, wo, _ = search.best_point

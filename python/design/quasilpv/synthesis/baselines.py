@@ -8,9 +8,11 @@ observer (Mohammadi et al. 2013). They read measured speeds, noisy and filtered.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import sympy as sp
 
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
@@ -30,49 +32,87 @@ conditionally stable: slower observers saturate the actuators on the default sce
 multiple of 50 that does not; its torque activity is about that of the default design."""
 
 
-def pid(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
-    """PID with feedforward: ``kp = 3 a w^2``, ``kd = 3 a w``, ``ki = a w^3``, a the largest diagonal inertia.
+@dataclass(frozen=True)
+class Tuning:
+    """The numbers of a baseline.
 
-    Every diagonal entry of the inertia of a serial arm is largest where all cosines are 1.
+    Attributes:
+        bandwidth_rad_s: w of the poles.
+        integral_ratio: slowest pole over the others; 1 for a triple pole.
+        velocity_filter_time_constant_s: of the measured speed.
+        observer_bandwidth_rad_s: of the disturbance observer; 0 for none.
+        inertia_scale: s, the design inertia over the nominal one. The feedforward of PID stays nominal.
+        payload_fraction: of PID, whose gains per joint are in the ratios of the inertia with this payload.
     """
-    w = BANDWIDTH_RAD_S
-    stretched = np.diag(robot.model.inertia(np.zeros(robot.model.joints)))
-    symbolic = robot.model.symbolic
-    speeds = sp.Matrix(reference_speeds(robot))
-    law = {
-        "kind": "pid",
-        "kp": (3.0 * w**2 * stretched).tolist(),
-        "kd": (3.0 * w * stretched).tolist(),
-        "ki": (w**3 * stretched).tolist(),
-        "velocity_filter_time_constant_s": VELOCITY_FILTER_TIME_CONSTANT_S,
-        "inertia": inertia_table(robot),
-    }
-    return _design(robot, specification, law, {"coriolis_reference": tuple(symbolic.coriolis * speeds)})
+
+    bandwidth_rad_s: float = BANDWIDTH_RAD_S
+    integral_ratio: float = 1.0
+    velocity_filter_time_constant_s: float = VELOCITY_FILTER_TIME_CONSTANT_S
+    observer_bandwidth_rad_s: float = 0.0
+    inertia_scale: float = 1.0
+    payload_fraction: float = 0.0
+
+    def unit_gains(self) -> tuple[float, float, float]:
+        """Gains (kp, kd, ki) per unit inertia: ``s^3 + kd s^2 + kp s + ki = (s + w)^2 (s + rho w)``."""
+        w, rho = self.bandwidth_rad_s, self.integral_ratio
+        return (1.0 + 2.0 * rho) * w**2, (2.0 + rho) * w, rho * w**3
+
+
+def stretched_inertia(robot: Robot, payload_fraction: float) -> npt.NDArray[np.float64]:
+    """Largest diagonal entries of the inertia with a payload, (n,): of a serial arm, where all cosines are 1.
+
+    They are scaled so that their sum is that of the nominal arm: the payload changes their ratios only.
+    """
+    nominal = np.diag(robot.model.inertia(np.zeros(robot.model.joints)))
+    if payload_fraction == 0.0:
+        return nominal
+    loaded = np.diag(robot.with_payload_fraction(payload_fraction).inertia(np.zeros(robot.model.joints)))
+    return np.asarray(loaded * (nominal.sum() / loaded.sum()))
+
+
+def pid(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
+    """PID with feedforward, gains of the thesis."""
+    return pid_design(robot, specification, Tuning())
 
 
 def computed_torque(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
-    """Computed torque without disturbance observer."""
-    return _computed_torque(robot, specification, "ctc", 0.0)
+    """Computed torque without disturbance observer, gains of the thesis."""
+    return computed_torque_design(robot, specification, Tuning())
 
 
 def computed_torque_with_observer(
     robot: Robot, specification: Specification, progress: Progress = no_progress
 ) -> TrackingDesign:
     """Computed torque with a disturbance observer of `DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S`."""
-    return _computed_torque(robot, specification, "ctc-dob", DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S)
+    tuning = Tuning(observer_bandwidth_rad_s=DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S)
+    return computed_torque_design(robot, specification, tuning)
 
 
-def _computed_torque(robot: Robot, specification: Specification, kind: str, bandwidth: float) -> TrackingDesign:
-    w, n = BANDWIDTH_RAD_S, robot.model.joints
+def pid_design(robot: Robot, specification: Specification, tuning: Tuning) -> TrackingDesign:
+    """PID with feedforward: unit gains times s times the `stretched_inertia` of each joint."""
     symbolic = robot.model.symbolic
+    speeds = sp.Matrix(reference_speeds(robot))
+    per_joint = tuning.inertia_scale * stretched_inertia(robot, tuning.payload_fraction)
+    gains = zip(("kp", "kd", "ki"), tuning.unit_gains(), strict=True)
     law = {
-        "kind": kind,
-        "gp": [3.0 * w**2] * n,
-        "gd": [3.0 * w] * n,
-        "gi": [w**3] * n,
-        "velocity_filter_time_constant_s": VELOCITY_FILTER_TIME_CONSTANT_S,
-        "disturbance_observer_bandwidth_rad_s": bandwidth,
+        "kind": "pid",
+        **{name: (gain * per_joint).tolist() for name, gain in gains},
+        "velocity_filter_time_constant_s": tuning.velocity_filter_time_constant_s,
         "inertia": inertia_table(robot),
+    }
+    return _design(robot, specification, law, {"coriolis_reference": tuple(symbolic.coriolis * speeds)})
+
+
+def computed_torque_design(robot: Robot, specification: Specification, tuning: Tuning) -> TrackingDesign:
+    """Computed torque, unit gains for every joint, with M = s M_nominal."""
+    symbolic = robot.model.symbolic
+    gains = zip(("gp", "gd", "gi"), tuning.unit_gains(), strict=True)
+    law = {
+        "kind": "ctc-dob" if tuning.observer_bandwidth_rad_s > 0.0 else "ctc",
+        **{name: [gain] * robot.model.joints for name, gain in gains},
+        "velocity_filter_time_constant_s": tuning.velocity_filter_time_constant_s,
+        "disturbance_observer_bandwidth_rad_s": tuning.observer_bandwidth_rad_s,
+        "inertia": inertia_table(robot, tuning.inertia_scale),
     }
     return _design(robot, specification, law, {"coriolis": tuple(symbolic.coriolis * sp.Matrix(symbolic.omega))})
 

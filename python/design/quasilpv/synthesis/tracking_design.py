@@ -17,7 +17,7 @@ class TrackingDesign:
     """A law ready to be written into an artifact.
 
     Attributes:
-        controller: the law kind, e.g. ``"dob-acceleration"``.
+        controller: its id; several controllers may share a law kind.
         robot: what it is for.
         sample_period_s: T.
         law: the fields of that law kind, as documented with the artifact format.
