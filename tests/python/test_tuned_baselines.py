@@ -179,15 +179,18 @@ def test_when_a_baseline_is_tuned_expect_what_was_asked_for_at_configurations_it
     assert design.report["worst_growth_rate_per_s"] < 0.0
 
 
-@pytest.mark.parametrize("controller", TUNED)
-def test_when_a_baseline_is_tuned_expect_it_to_reject_disturbances_better_than_the_gains_of_the_thesis(
-    controller: str,
+@pytest.mark.parametrize(
+    ("controller", "admissible"), [("pid-tuned", False), ("ctc-tuned", True), ("ctc-dob-tuned", False)]
+)
+def test_when_the_gains_of_the_thesis_meet_the_same_bounds_expect_only_computed_torque_to_pass_and_the_tuned_to_win(
+    controller: str, admissible: bool
 ) -> None:
     observer = {"ctc-dob-tuned": baselines.DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S}.get(controller, 0.0)
     rate, gain, activity = performance(controller, baselines.Tuning(observer_bandwidth_rad_s=observer))
     bound = 0.15 * np.linalg.norm(robot("arm3").limits.torque_nm)
-    admissible = rate < 0.0 and activity <= bound
-    assert not admissible or tuned(controller).report["disturbance_gain_s2"] < gain
+    assert (rate < 0.0 and activity <= bound) == admissible
+    if admissible:
+        assert tuned(controller).report["disturbance_gain_s2"] < gain
 
 
 def test_when_the_budget_is_counted_expect_that_of_the_default_design() -> None:
