@@ -59,7 +59,7 @@ def _plot_bars(axes: Axes, results: Sequence[TrackResult]) -> None:
         note = f" {value:.3g} mm, {result.metrics.rms_torque_increment_nm:.3g} N m per sample"
         axes.text(value, y, note, va="center", fontsize=8)
     axes.set_yticks(position, [_label(result) for result in results])
-    axes.set_xlim(0.3 * float(rms_mm.min()), 25.0 * float(rms_mm.max()))
+    axes.set_xlim(0.3 * float(rms_mm.min()), 60.0 * float(rms_mm.max()))
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("rms distance from the reference (mm); rms torque increment beside it")
 
