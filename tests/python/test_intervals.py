@@ -107,6 +107,24 @@ def test_a_product_of_independent_factors_is_exact() -> None:
     assert_allclose((low, high), (-5.0, 4.5), rtol=1e-15)
 
 
+REALS = (-float("inf"), float("inf"))
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        (1 / (1 + x**2), (0.0, 1.0)),
+        (1 / (1 + sp.exp(2 * x)), (0.0, 1.0)),
+        ((1 + sp.sin(x) ** 2) / 2, (0.5, 1.0)),
+        ((1 + 1 / (1 + x**2)) * sp.cos(y), (-2.0, 2.0)),
+    ],
+)
+def test_when_every_symbol_occurs_once_the_domain_may_be_the_whole_line(
+    expression: sp.Expr, expected: tuple[float, float]
+) -> None:
+    assert enclose(expression, {x: REALS, y: REALS}) == expected
+
+
 @pytest.mark.parametrize(
     ("expression", "domain", "words"),
     [
@@ -114,8 +132,10 @@ def test_a_product_of_independent_factors_is_exact() -> None:
         (1 / x, {x: (-1.0, 1.0)}, "division"),
         (sp.sqrt(x), {x: (-1.0, 1.0)}, "square root"),
         (sp.atan(x), {x: (-1.0, 1.0)}, "operation"),
-        (x, {x: (1.0, -1.0)}, "finite lower <= upper"),
-        (x, {x: (0.0, float("inf"))}, "finite lower <= upper"),
+        (x, {x: (1.0, -1.0)}, "lower <= upper"),
+        (x, {x: (float("nan"), 1.0)}, "lower <= upper"),
+        (x, {x: (0.0, float("inf"))}, "bounded range"),
+        (x**2 - x, {x: (0.0, float("inf"))}, "occurs more than once"),
         (sp.exp(sp.exp(x)), {x: (0.0, 20.0)}, "bounded range"),
     ],
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from quasilpv.errors import InputError
-from quasilpv.systems.premise import AffineMatrix, Premise
+from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
 
 # Coefficients are found exactly; two ways of writing one product of doubles may still differ by rounding.
 _ROUNDING = 1e-12
@@ -36,13 +36,13 @@ class DescriptorSystem:
         state: the symbols of x.
         inputs: names of u.
         premises: z_1 ... z_p with bounds valid over the domain.
-        E, A, B, C: affine matrices, q x q, q x q, q x m, o x q.
-        domain: interval of every symbol the premises depend on.
+        E, A, B, C: affine matrices, n x n, n x n, n x m, o x n, with E = diag(E_1, 0): the algebraic states come last.
+        domain: interval of every symbol the premises depend on; of other states it may be infinite.
 
     Raises:
-        InputError: the shapes of the parts do not agree.
+        InputError: the shapes of the parts do not agree, or E has not the form diag(E_1(z), 0).
 
-    Reference: Dehak 2022, (I.1) and (I.25).
+    Reference: Dehak 2022, (I.1), (I.21) and (I.25).
     """
 
     name: str
@@ -56,15 +56,21 @@ class DescriptorSystem:
     domain: Mapping[sp.Symbol, tuple[float, float]]
 
     def __post_init__(self) -> None:
-        """Refuse parts whose sizes disagree."""
-        q, m = len(self.state), len(self.inputs)
-        expected = {"E": (q, q), "A": (q, q), "B": (q, m), "C": (self.C.shape[0], q)}
+        """Refuse parts whose sizes disagree and states in another order than differential, algebraic."""
+        n, m = len(self.state), len(self.inputs)
+        expected = {"E": (n, n), "A": (n, n), "B": (n, m), "C": (self.C.shape[0], n)}
         for field, shape in expected.items():
             matrix: AffineMatrix = getattr(self, field)
             if matrix.shape != shape:
                 raise InputError(self.name, field, f"shape {matrix.shape}", f"shape {shape}")
             if matrix.premises != len(self.premises):
                 raise InputError(self.name, field, f"{matrix.premises} coefficients", f"{len(self.premises)}")
+        present = self._entries_of_E
+        q = self.differential
+        if present[q:].any() or present[:, q:].any() or not present[:, :q].any(axis=0).all():
+            rows, columns = present.any(axis=1), present.any(axis=0)
+            got = f"non-zero rows {np.flatnonzero(rows).tolist()} and columns {np.flatnonzero(columns).tolist()}"
+            raise InputError(self.name, "E", got, "diag(E_1, 0): the algebraic equations and states last")
 
     @classmethod
     def from_symbols(
@@ -101,8 +107,32 @@ class DescriptorSystem:
 
     @property
     def order(self) -> int:
-        """Number of states q."""
+        """Number of states n."""
         return len(self.state)
+
+    @cached_property
+    def differential(self) -> int:
+        """Number q of differential states x_d, the first ones: ``E(z) = diag(E_1(z), 0)`` with E_1 q x q.
+
+        q = n for a regular system. Whether E_1(z) is invertible in the box is another question: `structure_report`.
+        """
+        return int(self._entries_of_E.any(axis=1).sum())
+
+    @property
+    def _entries_of_E(self) -> NDArray[np.bool_]:
+        """Which entries of E are not identically 0, (n, n)."""
+        entries: NDArray[np.bool_] = (self.E.constant != 0) | (self.E.coefficients != 0).any(axis=0)
+        return entries
+
+    @cached_property
+    def uncertainty(self) -> NormBoundedUncertainty | None:
+        """The norm-bounded view of the unknown premises, None if every premise is known to the controller.
+
+        Raises:
+            InputError: E or C depends on an unknown premise.
+        """
+        unknown = [p for p, premise in enumerate(self.premises) if premise.kind is PremiseKind.UNKNOWN]
+        return NormBoundedUncertainty.of(self, unknown) if unknown else None
 
     @property
     def lower(self) -> NDArray[np.float64]:
@@ -133,6 +163,81 @@ class DescriptorSystem:
             if others:
                 raise InputError(self.name, f"premise {premise.name}", f"parameters {others}", "states only")
         return sp.lambdify(self.state, [premise.expression for premise in self.premises], "numpy")
+
+
+@dataclass(frozen=True, eq=False)
+class NormBoundedUncertainty:
+    """Unknown premises as ``A + H_a Delta W_a`` and ``B + H_b Delta' W_b`` with ``|Delta| <= 1``, ``|Delta'| <= 1``.
+
+    An unknown premise in [lower, upper] is ``centre + radius d`` with ``|d| <= 1``; each coefficient matrix times its
+    radius is factored at its rank k, so that Delta is diagonal, every d repeated k times.
+
+    Attributes:
+        nominal: the system at the centres of the unknown premises; the known premises remain.
+        Ha, Wa: n x k_a and k_a x n; no column if A does not depend on an unknown premise.
+        Hb, Wb: n x k_b and k_b x m.
+
+    Reference: Dehak 2022, (I.37) and Theorem I.3.
+    """
+
+    nominal: DescriptorSystem
+    Ha: NDArray[np.float64]
+    Wa: NDArray[np.float64]
+    Hb: NDArray[np.float64]
+    Wb: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, system: DescriptorSystem, unknown: Sequence[int]) -> NormBoundedUncertainty:
+        """Take the premises of the given indices for unknown.
+
+        Raises:
+            InputError: E or C depends on one of them.
+        """
+        for field in ("E", "C"):
+            matrix: AffineMatrix = getattr(system, field)
+            if matrix.coefficients[list(unknown)].any():
+                raise InputError(
+                    system.name, field, "an entry in an unknown premise", "unknown premises in A and B only"
+                )
+        known = [p for p in range(len(system.premises)) if p not in unknown]
+        centre = np.zeros(len(system.premises))
+        centre[list(unknown)] = 0.5 * (system.lower + system.upper)[list(unknown)]
+        radius = 0.5 * (system.upper - system.lower)
+
+        def nominal(matrix: AffineMatrix) -> AffineMatrix:
+            return AffineMatrix(matrix.evaluate(centre), matrix.coefficients[known])
+
+        Ha, Wa = _factored([radius[p] * system.A.coefficients[p] for p in unknown])
+        Hb, Wb = _factored([radius[p] * system.B.coefficients[p] for p in unknown])
+        return cls(
+            replace(
+                system,
+                premises=tuple(system.premises[p] for p in known),
+                E=nominal(system.E),
+                A=nominal(system.A),
+                B=nominal(system.B),
+                C=nominal(system.C),
+            ),
+            Ha,
+            Wa,
+            Hb,
+            Wb,
+        )
+
+
+def _factored(matrices: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Left factors side by side and right factors stacked, each at the rank of its matrix (full pivoting)."""
+    rows, columns = matrices[0].shape
+    left, right = [np.zeros((rows, 0))], [np.zeros((0, columns))]
+    for matrix in matrices:
+        remainder = np.array(matrix)
+        scale = np.abs(remainder).max(initial=0.0)
+        while np.abs(remainder).max(initial=0.0) > _ROUNDING * scale:
+            row, column = np.unravel_index(np.abs(remainder).argmax(), remainder.shape)
+            left.append(remainder[:, [column]])
+            right.append(remainder[[row], :] / remainder[row, column])
+            remainder = remainder - left[-1] @ right[-1]
+    return np.hstack(left), np.vstack(right)
 
 
 class _PremiseBasis:

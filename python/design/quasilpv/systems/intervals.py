@@ -40,7 +40,8 @@ def enclose(
 
     Args:
         expression: sums, products, integer powers, square roots, sin, cos, exp and sinc (sin(x)/x, 1 at 0) of symbols.
-        domain: the interval of every symbol that occurs.
+        domain: the interval of every symbol that occurs. It may be unbounded if every symbol occurs once, as in
+            1/(1 + x^2).
         tolerance: largest excess over the exact range, relative to max(1, |bound|). If `_MAX_BOXES` boxes do not reach
             it the bounds are wider, and still guaranteed.
 
@@ -56,8 +57,11 @@ def enclose(
         if symbol not in domain:
             raise InputError("domain", symbol.name, "nothing", f"an interval, because {expression} depends on it")
         low, high = domain[symbol]
-        if not (isfinite(low) and isfinite(high) and low <= high):
-            raise InputError("domain", symbol.name, (low, high), "finite lower <= upper")
+        if not low <= high:
+            raise InputError("domain", symbol.name, (low, high), "lower <= upper")
+        if not ((isfinite(low) and isfinite(high)) or _every_symbol_occurs_once(expression)):
+            expected = f"finite bounds, because a symbol occurs more than once in {expression}"
+            raise InputError("domain", symbol.name, (low, high), expected)
     box = tuple((float(domain[symbol][0]), float(domain[symbol][1])) for symbol in symbols)
     function = _IntervalFunction(expression, symbols)
     whole = function.value(box)

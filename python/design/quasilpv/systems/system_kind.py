@@ -1,0 +1,62 @@
+"""What an entry of the catalogue of descriptor systems is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import isfinite
+
+from quasilpv.errors import InputError
+from quasilpv.systems.descriptor import DescriptorSystem
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number a system of the catalogue depends on.
+
+    Attributes:
+        default: the value it has unless another is given.
+        summary: one line for a listing.
+        unit: its unit, ``"1"`` if it has none.
+        affine: the entries of E, A, B and C are jointly affine in all parameters so marked, and neither the premises
+            nor their bounds depend on them: a map over them can update the data of a problem instead of rebuilding it.
+    """
+
+    default: float
+    summary: str
+    unit: str = "1"
+    affine: bool = False
+
+
+@dataclass(frozen=True)
+class SystemKind:
+    """A parametrised descriptor system.
+
+    Attributes:
+        id: the name it is known by.
+        summary: one line for a listing.
+        reference: where it comes from.
+        parameters: its parameters by name.
+        build: makes the system; called with every parameter by name.
+    """
+
+    id: str
+    summary: str
+    reference: str
+    parameters: Mapping[str, Parameter]
+    build: Callable[..., DescriptorSystem]
+
+    def system(self, **parameters: float) -> DescriptorSystem:
+        """The system at the given parameters, defaults for the others.
+
+        Raises:
+            InputError: a parameter does not exist (those that do are listed), is not finite, or has no meaning.
+        """
+        for name, value in parameters.items():
+            if name not in self.parameters:
+                known = f"one of {', '.join(self.parameters)}" if self.parameters else "no parameter"
+                raise InputError(self.id, "parameter", name, known)
+            if not isfinite(value):
+                raise InputError(self.id, name, value, "a finite number")
+        defaults = {name: parameter.default for name, parameter in self.parameters.items()}
+        return self.build(**(defaults | {name: float(value) for name, value in parameters.items()}))
