@@ -28,6 +28,8 @@ a factor that depends on the largest rank of the X_p (pi/2 for rank 2) and not o
 
 from quasilpv.polytopes.block import Block
 from quasilpv.polytopes.block_polytope import BlockPolytope
+from quasilpv.polytopes.model import PolytopicModel
 from quasilpv.polytopes.multilinear import MultilinearForm
+from quasilpv.polytopes.representation import polytopic_model
 
-__all__ = ["Block", "BlockPolytope", "MultilinearForm"]
+__all__ = ["Block", "BlockPolytope", "MultilinearForm", "PolytopicModel", "polytopic_model"]

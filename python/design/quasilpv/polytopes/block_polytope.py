@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from itertools import chain, combinations
 from typing import Any
@@ -122,10 +123,10 @@ class BlockPolytope:
         return cls.per_premise(lower, upper, centre=centre, unknown=range(r, total))
 
     @classmethod
-    def reduced_affine(cls, lower: ArrayLike, upper: ArrayLike) -> BlockPolytope:
+    def reduced_affine(cls, lower: ArrayLike, upper: ArrayLike, *, unknown: Sequence[int] = ()) -> BlockPolytope:
         """One simplex block of all premises, r + 1 vertices (centring has no effect on a single block)."""
         r = np.size(lower)
-        return cls.from_blocks(lower, upper, [Block("simplex" if r else "box", tuple(range(r)))])
+        return cls.from_blocks(lower, upper, [Block("simplex" if r else "box", tuple(range(r)))], unknown=unknown)
 
     # ---- sizes and indices -----------------------------------------------------------------------------------------
 
@@ -182,12 +183,21 @@ class BlockPolytope:
 
         ``zc + G (c_i - zc)`` on the premises of the vertex's block, ``zc`` on the others.
         """
-        offsets = np.tile(self.centre, (self.vertex_count, 1))
+        return self.exact_vertex_offsets.astype(float)
+
+    @cached_property
+    def exact_vertex_offsets(self) -> NDArray[Any]:
+        """`vertex_offsets` without rounding: bounds and centre are taken as the rationals they are, (N, r)."""
+        low, high, centre = (
+            np.array([Fraction(bound) for bound in bounds.tolist()], dtype=object)
+            for bounds in (self.lower, self.upper, self.centre)
+        )
+        offsets = np.tile(centre, (self.vertex_count, 1))
         row = 0
         for block in self.blocks:
             p = list(block.premises)
-            corners = self.lower[p] + block.corners() * (self.upper[p] - self.lower[p])
-            offsets[row : row + block.vertices, p] += len(self.blocks) * (corners - self.centre[p])
+            corners = low[p] + block.corners().astype(int) * (high[p] - low[p])
+            offsets[row : row + block.vertices, p] += len(self.blocks) * (corners - centre[p])
             row += block.vertices
         return offsets
 
