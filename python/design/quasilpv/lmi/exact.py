@@ -19,6 +19,21 @@ def to_rational(matrix: Any) -> Matrix:
     return exact
 
 
+def over_common_denominator(entries: Any) -> tuple[Matrix, int]:
+    """Exact numbers as integers over one denominator: ``entries = integers / denominator``.
+
+    Args:
+        entries: flat array of doubles, integers or rationals.
+
+    Returns:
+        An array of Python integers, and the denominator > 0.
+    """
+    ratios = [entry.as_integer_ratio() for entry in np.asarray(entries).tolist()]
+    common = lcm(1, *{denominator for _, denominator in ratios})
+    integers = [numerator * (common // denominator) for numerator, denominator in ratios]
+    return np.array(integers, dtype=object), common
+
+
 def symmetric_part(matrix: Matrix) -> Matrix:
     """``(X + X') / 2``, exact for a rational matrix."""
     symmetric: Matrix = (matrix + matrix.T) * Fraction(1, 2)
@@ -28,9 +43,8 @@ def symmetric_part(matrix: Matrix) -> Matrix:
 def is_positive_definite(matrix: Matrix) -> bool:
     """Whether a symmetric rational matrix is positive definite, decided without rounding.
 
-    The leading minors ``d_1, d_2, ...`` of an integer multiple of ``S M S`` are all positive (Sylvester), S a diagonal
-    of powers of two that brings the diagonal near one and keeps the integers short. Fraction-free elimination (Bareiss
-    1968): ``m_ij <- (d_k m_ij - m_ik m_kj) / d_{k-1}`` divides without remainder, and its pivots are the minors.
+    The leading minors of an integer multiple of ``S M S`` are all positive (Sylvester), S a diagonal of powers of two
+    that brings the diagonal near one and keeps the integers short.
 
     Args:
         matrix: square array of `fractions.Fraction` or int, symmetric.
@@ -44,7 +58,18 @@ def is_positive_definite(matrix: Matrix) -> bool:
         raise ValueError(f"expected a symmetric matrix, got shape {work.shape}")
     if any(work[k, k] <= 0 for k in range(size)):
         return False
-    rows = _integer_rows(work)
+    return has_positive_minors(_integer_rows(work))
+
+
+def has_positive_minors(rows: list[list[int]]) -> bool:
+    """Whether all leading minors of a symmetric integer matrix are positive, that is, whether it is positive definite.
+
+    Fraction-free elimination (Bareiss 1968): ``m_ij <- (d_k m_ij - m_ik m_kj) / d_{k-1}`` divides without remainder,
+    and its pivots are the minors ``d_1, d_2, ...``.
+
+    Args:
+        rows: of the upper triangle, the diagonal entry first; used as scratch memory.
+    """
     previous = 1
     for k, row in enumerate(rows):
         pivot = row[0]

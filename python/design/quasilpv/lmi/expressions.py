@@ -15,9 +15,12 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from quasilpv.lmi.exact import Matrix, to_rational
+from quasilpv.lmi.exact import Matrix, over_common_denominator, to_rational
 
-Triplets: TypeAlias = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.float64]]
+Indices: TypeAlias = npt.NDArray[np.intp]
+Places: TypeAlias = tuple[Indices, Indices]
+Triplets: TypeAlias = tuple[Indices, Indices, Indices, npt.NDArray[np.float64]]
+ExactTriplets: TypeAlias = tuple[Indices, Indices, Indices, npt.NDArray[Any], int]
 
 _ids = itertools.count()
 
@@ -157,14 +160,22 @@ class Product:
 
     def derivative(self) -> Triplets:
         """``d term / d unknowns`` as (row, column, unknown, value), one entry per non-zero product; double."""
-        index = self.variable.index().T if self.transposed else self.variable.index()
-        i, p = np.nonzero(self.left)
-        q, j = np.nonzero(self.right)
+        (i, p), (q, j), places = self._places()
         value = np.outer(self.left[i, p].astype(float), self.right[q, j].astype(float))
-        shape = value.shape
-        row = np.broadcast_to(i[:, None], shape).ravel()
-        column = np.broadcast_to(j[None, :], shape).ravel()
-        return row, column, index[p[:, None], q[None, :]].ravel(), value.ravel()
+        return *places, value.ravel()
+
+    def exact_derivative(self) -> ExactTriplets:
+        """`derivative` without rounding: (row, column, unknown, integer value, common denominator)."""
+        (i, p), (q, j), places = self._places()
+        left, left_denominator = over_common_denominator(self.left[i, p])
+        right, right_denominator = over_common_denominator(self.right[q, j])
+        return *places, np.multiply.outer(left, right).ravel(), left_denominator * right_denominator
+
+    def _places(self) -> tuple[Places, Places, tuple[Indices, Indices, Indices]]:
+        """Where left and right are not zero, and row, column and unknown of every product of such entries."""
+        index = self.variable.index().T if self.transposed else self.variable.index()
+        (i, p), (q, j) = np.nonzero(self.left), np.nonzero(self.right)
+        return (i, p), (q, j), (np.repeat(i, len(j)), np.tile(j, len(i)), index[p[:, None], q[None, :]].ravel())
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,6 +220,11 @@ class ScalarProduct:
         """``d term / d x`` as (row, column, unknown, value); double."""
         row, column = np.nonzero(self.coefficient)
         return row, column, np.zeros_like(row), self.coefficient[row, column].astype(float)
+
+    def exact_derivative(self) -> ExactTriplets:
+        """`derivative` without rounding: (row, column, unknown, integer value, common denominator)."""
+        row, column = np.nonzero(self.coefficient)
+        return row, column, np.zeros_like(row), *over_common_denominator(self.coefficient[row, column])
 
 
 Term: TypeAlias = Product | ScalarProduct

@@ -1,0 +1,331 @@
+"""Linear matrix inequalities as numbers: sparse, exact, and affine in parameters when a family of problems is.
+
+`CompiledProblem` holds, for every inequality ``F_k(x) = F_k0 + sum_j x_j F_kj > 0``, the upper triangle of its
+symmetric part as exact rational coefficients over the vector x of all unknowns. `compile_family` compiles a problem
+whose data are affine in parameters once, ``F(x; p) = F(x; 0) + sum_i p_i G_i(x)``: a sweep over the parameters then
+updates numbers instead of building matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from math import lcm
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+from scipy.linalg import qr
+
+from quasilpv.lmi.assembly import unknown_offsets, unpack
+from quasilpv.lmi.exact import has_positive_minors, over_common_denominator
+from quasilpv.lmi.expressions import Expression, Variable
+from quasilpv.lmi.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+IndexArray = npt.NDArray[np.intp]
+ExactArray = npt.NDArray[Any]
+
+CANDIDATE_BITS = 40
+"""A candidate point is rounded to this many bits below its largest entry before it is checked exactly."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Which entry of which inequality a row is, and which unknown a coefficient multiplies.
+
+    Rows number the upper triangles of all inequalities, one after the other, column by column.
+
+    Attributes:
+        names: of the inequalities.
+        sizes: order of every inequality.
+        variables: whose unknowns, one after the other, form x.
+        row, unknown: place of every coefficient, (nnz,); unknown -1 is the constant term.
+    """
+
+    names: tuple[str, ...]
+    sizes: tuple[int, ...]
+    variables: tuple[Variable, ...]
+    row: IndexArray
+    unknown: IndexArray
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of all upper triangles."""
+        return sum(size * (size + 1) // 2 for size in self.sizes)
+
+    @property
+    def unknowns(self) -> int:
+        """Number of scalar unknowns."""
+        return sum(variable.size for variable in self.variables)
+
+    @cached_property
+    def diagonal(self) -> npt.NDArray[np.bool_]:
+        """Whether a row is a diagonal entry, (rows,)."""
+        flags = np.zeros(self.rows, dtype=bool)
+        start = 0
+        for size in self.sizes:
+            flags[start + np.cumsum(np.arange(1, size + 1)) - 1] = True
+            start += size * (size + 1) // 2
+        return flags
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledProblem:
+    """The inequalities of a problem as exact coefficients; see the module.
+
+    Attributes:
+        layout: where the coefficients belong.
+        coefficients: integers, (nnz,), off-diagonal ones of twice the symmetric part.
+        denominator: that all of them share.
+        kept: unknowns that are free; the others are zero without loss, because their columns depend on the kept ones.
+    """
+
+    layout: Layout
+    coefficients: ExactArray
+    denominator: int
+    kept: IndexArray
+
+    @classmethod
+    def of(cls, problem: Problem) -> CompiledProblem:
+        """Compile one problem; its objective plays no part."""
+        table = _Coefficients.of(problem)
+        layout = _layout(problem, table.places)
+        return cls(layout, table.integers, table.denominator, _independent_columns(layout, table.integers[None]))
+
+    def matrix(self) -> tuple[sparse.csc_matrix, FloatArray]:
+        """``(G, g)`` with the scaled upper triangles ``svec(F(x)) = G x_kept + g``, in double.
+
+        Off-diagonal entries carry a factor sqrt(2), so that inner products of matrices are those of vectors.
+        """
+        layout = self.layout
+        scale = np.where(layout.diagonal, 1.0, np.sqrt(0.5))[layout.row]
+        values = scale * np.array([c / self.denominator for c in self.coefficients.tolist()])
+        constant = layout.unknown < 0
+        offset = np.zeros(layout.rows)
+        np.add.at(offset, layout.row[constant], values[constant])
+        shape = (layout.rows, layout.unknowns)
+        places = (layout.row[~constant], layout.unknown[~constant])
+        return sparse.csc_matrix((values[~constant], places), shape=shape)[:, self.kept], offset
+
+    def values(self, point: FloatArray) -> dict[Variable, FloatArray]:
+        """One matrix per variable from the kept unknowns, (kept,)."""
+        return unpack(self._full(point), self.layout.variables)
+
+    def holds_exactly(self, point: FloatArray) -> bool:
+        """Whether every inequality holds strictly at the kept unknowns, in integer arithmetic.
+
+        The point is taken as it is; round it first (`rounded`) to keep the integers short.
+        """
+        return self.first_violated(point) is None
+
+    def first_violated(self, point: FloatArray) -> str | None:
+        """Name of the first inequality that does not hold strictly at a point, or None."""
+        x, denominator = _integers(self._full(point))
+        constant = self.layout.unknown < 0
+        factors = np.where(constant, denominator, x[self.layout.unknown])
+        entries = np.zeros(self.layout.rows, dtype=object)
+        np.add.at(entries, self.layout.row, self.coefficients * factors)
+        entries = np.where(self.layout.diagonal, 2 * entries, entries)
+        start = 0
+        for name, size in zip(self.layout.names, self.layout.sizes, strict=True):
+            end = start + size * (size + 1) // 2
+            if not has_positive_minors(_triangle_rows(entries[start:end].tolist(), size)):
+                return name
+            start = end
+        return None
+
+    def _full(self, point: FloatArray) -> FloatArray:
+        full = np.zeros(self.layout.unknowns)
+        full[self.kept] = point
+        return full
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledFamily:
+    """Problems with data affine in parameters.
+
+    Attributes:
+        layout: common to all.
+        parameters: their names.
+        coefficients: integers, (1 + parameters, nnz): the constant part, then one slope per parameter.
+        denominator: that all of them share.
+        kept: as in `CompiledProblem`; the dependence holds for all parameters.
+    """
+
+    layout: Layout
+    parameters: tuple[str, ...]
+    coefficients: ExactArray
+    denominator: int
+    kept: IndexArray
+
+    def at(self, parameters: Mapping[str, float]) -> CompiledProblem:
+        """The problem at a point.
+
+        Args:
+            parameters: a value for every parameter; doubles are taken as the rationals they are.
+        """
+        point = [Fraction(parameters[name]) for name in self.parameters]
+        scale = lcm(1, *(value.denominator for value in point))
+        factors = [scale, *(int(value * scale) for value in point)]
+        coefficients = sum((f * row for f, row in zip(factors, self.coefficients, strict=True)), 0)
+        return CompiledProblem(self.layout, np.asarray(coefficients), self.denominator * scale, self.kept)
+
+
+def compile_family(build: Callable[[Mapping[str, float]], Problem], base: Mapping[str, float]) -> CompiledFamily | None:
+    """Compile a family of problems, or None if its data are not affine in the parameters.
+
+    The problem is built at the base point, at a unit step along every parameter, and at two further points where the
+    affine model is compared with the truth, exactly.
+
+    Args:
+        build: the problem at a parameter point; always the same unknowns and inequalities in the same order.
+        base: names of the parameters and a point.
+    """
+    names = tuple(base)
+    problem = build(base)
+    tables = [_Coefficients.of(problem)]
+    tables += [_Coefficients.of(build({**base, name: base[name] + 1.0})) for name in names]
+    tests = _test_points(base)
+    tables += [_Coefficients.of(build(test)) for test in tests]
+    places = np.unique(np.concatenate([table.places for table in tables]))
+    denominator = lcm(*(table.denominator for table in tables))
+    origin, *others = (table.spread(places, denominator) for table in tables)
+    slopes, seen = [row - origin for row in others[: len(names)]], others[len(names) :]
+    shift = [Fraction(base[name]) for name in names]
+    scale = lcm(1, *(value.denominator for value in shift))
+    constant = scale * origin - sum((int(scale * p) * row for p, row in zip(shift, slopes, strict=True)), 0)
+    coefficients = np.stack([constant, *(scale * row for row in slopes)])
+    layout = _layout(problem, places)
+    kept = _independent_columns(layout, coefficients)
+    family = CompiledFamily(layout, names, coefficients, denominator * scale, kept)
+    for test, row in zip(tests, seen, strict=True):
+        member = family.at(test)
+        if np.any(member.coefficients * denominator != row * member.denominator):
+            return None
+    return family
+
+
+def rounded(point: FloatArray) -> FloatArray:
+    """A point with its entries rounded to `CANDIDATE_BITS` bits below the largest one; exact in double."""
+    largest = float(np.max(np.abs(point), initial=0.0))
+    if largest == 0.0:
+        return point
+    unit = 2.0 ** (np.frexp(largest)[1] - CANDIDATE_BITS)
+    return np.asarray(np.round(point / unit) * unit)
+
+
+def _test_points(base: Mapping[str, float]) -> list[dict[str, float]]:
+    """Two points off the axes through the base point; the values are exact in double."""
+    first = {name: base[name] - 1.75 * (k + 1) for k, name in enumerate(base)}
+    second = {name: base[name] + 3.25 + 0.5 * k for k, name in enumerate(base)}
+    return [first, second]
+
+
+@dataclass(frozen=True, eq=False)
+class _Coefficients:
+    """Exact coefficients of a problem by place, ``(row, unknown) -> row (U + 1) + unknown + 1``.
+
+    Attributes:
+        places: (nnz,), ascending.
+        integers: (nnz,), off-diagonal ones of twice the symmetric part.
+        denominator: that all of them share.
+    """
+
+    places: IndexArray
+    integers: ExactArray
+    denominator: int
+
+    @classmethod
+    def of(cls, problem: Problem) -> _Coefficients:
+        """Read them off the terms."""
+        offsets = unknown_offsets(problem.variables)
+        stride = 1 + sum(variable.size for variable in problem.variables)
+        parts: list[tuple[IndexArray, ExactArray, int]] = []
+        start = 0
+        for constraint in problem.constraints:
+            for row, column, unknown, integers, denominator in _exact_entries(constraint.expression, offsets):
+                low, high = np.minimum(row, column), np.maximum(row, column)
+                parts.append(((start + high * (high + 1) // 2 + low) * stride + unknown + 1, integers, denominator))
+            size = constraint.expression.shape[0]
+            start += size * (size + 1) // 2
+        common = lcm(1, *{denominator for _, _, denominator in parts})
+        places = np.concatenate([part[0] for part in parts])
+        values = np.concatenate([integers * (common // denominator) for _, integers, denominator in parts])
+        order = np.argsort(places, kind="stable")
+        unique, first = np.unique(places[order], return_index=True)
+        return cls(unique, np.add.reduceat(values[order], first), common)
+
+    def spread(self, places: IndexArray, denominator: int) -> ExactArray:
+        """The integers at a superset of the places, over a multiple of the denominator."""
+        spread = np.zeros(len(places), dtype=object)
+        spread[np.searchsorted(places, self.places)] = self.integers * (denominator // self.denominator)
+        return spread
+
+
+def _exact_entries(
+    expression: Expression, offsets: Mapping[Variable, int]
+) -> Iterator[tuple[IndexArray, IndexArray, IndexArray, ExactArray, int]]:
+    """(rows, columns, unknowns, integers, denominator) of every term; unknown -1 is the constant."""
+    for term in expression.terms:
+        row, column, unknown, integers, denominator = term.exact_derivative()
+        yield row, column, unknown + offsets[term.variable], integers, denominator
+    row, column = np.nonzero(expression.constant)
+    if row.size:
+        yield row, column, np.full(row.shape, -1), *over_common_denominator(expression.constant[row, column])
+
+
+def _layout(problem: Problem, places: IndexArray) -> Layout:
+    row, unknown = np.divmod(places, 1 + sum(variable.size for variable in problem.variables))
+    return Layout(
+        names=tuple(c.name for c in problem.constraints),
+        sizes=tuple(c.expression.shape[0] for c in problem.constraints),
+        variables=problem.variables,
+        row=row,
+        unknown=unknown - 1,
+    )
+
+
+def _independent_columns(layout: Layout, coefficients: ExactArray) -> IndexArray:
+    """Unknowns whose columns span those of all, whatever the parameters; (levels, nnz) coefficients, exact.
+
+    The slack matrices of a representation, for example, enter through their differences only. Columns are compared over
+    all levels (constant part and slopes) at once: a dependence found here holds for every parameter point.
+    """
+    if layout.unknowns > MAX_COLUMNS_REDUCED:
+        return np.arange(layout.unknowns)
+    linear = layout.unknown >= 0
+    height = layout.rows * len(coefficients)
+    row = np.concatenate([layout.row[linear] + level * layout.rows for level in range(len(coefficients))])
+    values = coefficients[:, linear].ravel()
+    largest = max(map(abs, values.tolist()), default=1)
+    column = np.tile(layout.unknown[linear], len(coefficients))
+    shape = (height, layout.unknowns)
+    stacked = sparse.csr_matrix(([value / largest for value in values.tolist()], (row, column)), shape=shape)
+    dense = stacked[np.flatnonzero(np.diff(stacked.indptr))].toarray()
+    norms = np.linalg.norm(dense, axis=0)
+    triangle, pivots = qr(dense / np.where(norms > 0.0, norms, 1.0), mode="r", pivoting=True)
+    pivot_sizes = np.abs(np.diag(triangle))
+    rank = int(np.count_nonzero(pivot_sizes > RANK_TOLERANCE * max(pivot_sizes, default=0.0)))
+    return np.sort(pivots[:rank])
+
+
+MAX_COLUMNS_REDUCED = 3_000
+"""Larger problems keep all unknowns: the factorisation would cost more than it saves."""
+
+RANK_TOLERANCE = 1e-9
+
+
+def _integers(point: FloatArray) -> tuple[ExactArray, int]:
+    """Doubles as integers over a common power of two."""
+    ratios = [value.as_integer_ratio() for value in point.tolist()]
+    common = max((denominator for _, denominator in ratios), default=1)
+    return np.array([n * (common // d) for n, d in ratios], dtype=object), common
+
+
+def _triangle_rows(entries: list[int], size: int) -> list[list[int]]:
+    """Rows of the upper triangle from its entries column by column."""
+    return [[entries[j * (j + 1) // 2 + i] for j in range(i, size)] for i in range(size)]

@@ -1,0 +1,94 @@
+"""Is a set of homogeneous linear matrix inequalities feasible? The answer of a solver, and what it is worth.
+
+Inequalities ``F_k(x) > 0`` without constant terms hold at x if and only if they hold at every positive multiple of x,
+so nothing is lost by asking a solver for ``F_k(x) >= I``: a solution leaves room for an exact proof, and x = 0 is none.
+A candidate counts only after that proof. Infeasibility is numerical: the solver's dual certificate Z with ``Z_k >= 0``,
+``sum_k <F_k(x), Z_k> = <r, x>`` shows that no x of norm below ``sum_k tr Z_k / |r|`` satisfies ``F_k(x) >= I``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import clarabel
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+
+from quasilpv.lmi.compiled import CompiledProblem, rounded
+from quasilpv.lmi.expressions import Variable
+from quasilpv.lmi.problem import Outcome
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What is known about a set of inequalities.
+
+    Attributes:
+        outcome: `Outcome.VERIFIED` (proved, exact arithmetic), `Outcome.SOLVER_ONLY`, `Outcome.INFEASIBLE_NUMERICALLY`
+            or `Outcome.UNKNOWN`.
+        values: the proved point, one matrix per variable; empty otherwise.
+        excluded_norm: of a numerically infeasible problem: no x of smaller Euclidean norm satisfies ``F_k(x) >= I``,
+            as far as the certificate was computed correctly. NaN otherwise.
+        solver_status: in the solver's words.
+        iterations: of the solver.
+    """
+
+    outcome: Outcome
+    values: Mapping[Variable, FloatArray] = field(default_factory=dict)
+    excluded_norm: float = float("nan")
+    solver_status: str = ""
+    iterations: int = 0
+
+    @property
+    def feasible(self) -> bool:
+        """Whether feasibility was proved."""
+        return self.outcome is Outcome.VERIFIED
+
+
+def decide(problem: CompiledProblem) -> Decision:
+    """Decide homogeneous inequalities.
+
+    Args:
+        problem: without constant terms.
+
+    Raises:
+        ValueError: an inequality has a constant term.
+    """
+    coefficients, offset = problem.matrix()
+    if offset.any():
+        raise ValueError("decide: the inequalities have constant terms, expected homogeneous ones")
+    solution = _solve(problem, coefficients)
+    status = str(solution.status)
+    point = np.asarray(solution.x)
+    if np.all(np.isfinite(point)) and "Infeasible" not in status:
+        candidate = rounded(point)
+        if problem.holds_exactly(candidate):
+            return Decision(Outcome.VERIFIED, problem.values(candidate), np.nan, status, solution.iterations)
+        if status == "Solved":
+            return Decision(Outcome.SOLVER_ONLY, {}, np.nan, status, solution.iterations)
+    if "PrimalInfeasible" in status:
+        excluded = _excluded_norm(problem, coefficients, np.asarray(solution.z))
+        return Decision(Outcome.INFEASIBLE_NUMERICALLY, {}, excluded, status, solution.iterations)
+    return Decision(Outcome.UNKNOWN, {}, np.nan, status, solution.iterations)
+
+
+def _solve(problem: CompiledProblem, coefficients: sparse.csc_matrix) -> clarabel.DefaultSolution:
+    unknowns = coefficients.shape[1]
+    identity = problem.layout.diagonal.astype(float)
+    cones = [clarabel.PSDTriangleConeT(size) for size in problem.layout.sizes]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.max_threads = 1
+    settings.direct_solve_method = "faer"
+    quadratic = sparse.csc_matrix((unknowns, unknowns))
+    return clarabel.DefaultSolver(quadratic, np.zeros(unknowns), -coefficients, -identity, cones, settings).solve()
+
+
+def _excluded_norm(problem: CompiledProblem, coefficients: sparse.csc_matrix, dual: FloatArray) -> float:
+    residual = float(np.linalg.norm(coefficients.T @ dual))
+    traces = float(dual @ problem.layout.diagonal)
+    return traces / residual if residual > 0.0 else np.inf

@@ -1,0 +1,143 @@
+"""Compiled inequalities, families affine in parameters, and decisions that are proved."""
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from quasilpv.lmi import Outcome, Problem, Variable, block, he
+from quasilpv.lmi.compiled import CompiledProblem, compile_family, rounded
+from quasilpv.lmi.feasibility import decide
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def lyapunov(A: np.ndarray) -> Problem:
+    """``P > 0, A P + P A' < 0`` as exact data."""
+    exact = np.array([[Fraction(float(entry)) for entry in row] for row in A], dtype=object)
+    P = Variable("P", len(A), symmetric=True)
+    problem = Problem()
+    problem.positive("P", P)
+    problem.negative("decrease", he(exact @ P))
+    return problem
+
+
+def random_problem(seed: int) -> Problem:
+    """Two inequalities in a symmetric, a rectangular and a scalar unknown, with data of all kinds of number."""
+    rng = np.random.default_rng(seed)
+    P, Y, t = Variable("P", 3, symmetric=True), Variable("Y", 2, 3), Variable("t", 1)
+    A, B = rng.integers(-9, 9, (3, 3)) * Fraction(1, 7), rng.standard_normal((3, 2))
+    problem = Problem()
+    problem.positive("first", block([[P - A @ Y.T @ B.T, None], [Y, t * np.eye(2, dtype=int)]]))
+    problem.negative("second", he(A @ P + B @ Y) - t * rng.standard_normal((3, 3)))
+    return problem
+
+
+@given(SEEDS)
+@settings(max_examples=25, deadline=None)
+def test_compiled_matrices_are_the_values_of_the_expressions(seed: int) -> None:
+    problem = random_problem(seed)
+    compiled = CompiledProblem.of(problem)
+    rng = np.random.default_rng(seed)
+    point = rng.standard_normal(len(compiled.kept))
+    values = compiled.values(point)
+    coefficients, offset = compiled.matrix()
+    expected = []
+    for constraint in problem.constraints:
+        matrix = constraint.expression.at(values).astype(float)
+        symmetric = (matrix + matrix.T) / 2
+        size = len(symmetric)
+        expected += [symmetric[i, j] * (1 if i == j else 2**0.5) for j in range(size) for i in range(j + 1)]
+    np.testing.assert_allclose(coefficients @ point + offset, expected, atol=1e-12, rtol=1e-12)
+
+
+@given(SEEDS)
+@settings(max_examples=25, deadline=None)
+def test_integer_check_agrees_with_rational_evaluation_of_the_expressions(seed: int) -> None:
+    problem = random_problem(seed)
+    compiled = CompiledProblem.of(problem)
+    rng = np.random.default_rng(seed)
+    verdicts = set()
+    for spread in (0.0, 0.1, 10.0):
+        values = {v: spread * rng.standard_normal((v.rows, v.cols)) for v in problem.variables}
+        for v in problem.variables:
+            if v.symmetric:
+                values[v] = values[v] + values[v].T + 5 * np.eye(v.rows)
+        point = np.concatenate([_packed(v, values[v]) for v in problem.variables])
+        full = CompiledProblem(compiled.layout, compiled.coefficients, compiled.denominator, np.arange(point.size))
+        assert full.holds_exactly(point) == problem.holds_exactly(values)
+        verdicts.add(full.holds_exactly(point))
+
+
+def _packed(variable: Variable, value: np.ndarray) -> np.ndarray:
+    flat = np.zeros(variable.size)
+    flat[variable.index().ravel()] = value.ravel()
+    return flat
+
+
+def test_dependent_unknowns_are_dropped_without_loss() -> None:
+    T, S, P = Variable("T", 2, symmetric=True), Variable("S", 2, symmetric=True), Variable("P", 2, symmetric=True)
+    problem = Problem()
+    problem.positive("P", P)
+    problem.positive("sum", P + T + S)
+    problem.positive("other", P - T - S)
+    compiled = CompiledProblem.of(problem)
+    assert compiled.layout.unknowns == 9
+    assert len(compiled.kept) == 6
+    coefficients, _ = compiled.matrix()
+    assert np.linalg.matrix_rank(coefficients.toarray()) == 6
+
+
+def family(parameters: Mapping[str, float]) -> Problem:
+    a, b = parameters["a"], parameters["b"]
+    return lyapunov(np.array([[-1.0 + a, 2.0 * b], [0.5, -3.0 - a]]))
+
+
+@given(st.floats(-8, 8), st.floats(-20, 20))
+@settings(max_examples=25, deadline=None)
+def test_a_family_gives_the_problem_of_every_parameter_point_exactly(a: float, b: float) -> None:
+    compiled = compile_family(family, {"a": 0.0, "b": 0.0})
+    assert compiled is not None
+    member, direct = compiled.at({"a": a, "b": b}), CompiledProblem.of(family({"a": a, "b": b}))
+    # The vertices -1 + a are rounded by `family` itself: compare in double.
+    for one, other in zip(member.matrix(), direct.matrix(), strict=True):
+        difference = one - other
+        assert np.max(np.abs(difference.toarray() if hasattr(difference, "toarray") else difference)) < 1e-14 * 30
+
+
+def test_data_that_are_not_affine_in_a_parameter_have_no_family() -> None:
+    assert compile_family(lambda p: lyapunov(np.array([[-1.0 - p["a"] ** 2]])), {"a": 1.0}) is None
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_lyapunov_inequality_is_decided_as_the_eigenvalues_say(seed: int) -> None:
+    A = np.random.default_rng(seed).standard_normal((3, 3))
+    abscissa = np.linalg.eigvals(A).real.max()
+    if abs(abscissa) < 0.02:
+        return
+    decision = decide(CompiledProblem.of(lyapunov(A)))
+    expected = Outcome.VERIFIED if abscissa < 0 else Outcome.INFEASIBLE_NUMERICALLY
+    assert decision.outcome is expected
+    if decision.feasible:
+        (P,) = decision.values.values()
+        assert np.linalg.eigvalsh(P)[0] > 0 > np.linalg.eigvalsh(A @ P + P @ A.T)[-1]
+    else:
+        assert decision.excluded_norm > 1e3
+
+
+def test_inequalities_with_constants_are_refused() -> None:
+    P = Variable("P", 2, symmetric=True)
+    problem = Problem()
+    problem.positive("P > I", P - np.eye(2))
+    with pytest.raises(ValueError, match="constant terms"):
+        decide(CompiledProblem.of(problem))
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20))
+def test_rounding_moves_a_point_by_less_than_its_unit(entries: list[float]) -> None:
+    point = np.array(entries)
+    assert np.max(np.abs(rounded(point) - point)) <= 2.0**-39 * max(np.max(np.abs(point)), 1e-300)
