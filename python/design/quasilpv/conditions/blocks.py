@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import StrEnum
 from fractions import Fraction
 
 import numpy as np
@@ -11,6 +12,20 @@ import numpy.typing as npt
 from quasilpv.lmi import Expression, Problem, Variable, block, zeros
 from quasilpv.lmi.exact import Matrix
 from quasilpv.lmi.expressions import Operand, as_expression
+
+
+class Slack(StrEnum):
+    """Which slack matrices a sum over vertices is given: additions whose weighted mean is zero by construction.
+
+    The weights of every block of a block polytope sum to 1/G, so ``sum_i w_i (T_b(i) - (1/G) sum_b T_b) = 0`` whatever
+    the T_b. In a double sum T may depend on the other index.
+    """
+
+    NONE = "none"
+    THESIS = "thesis"
+    """One T_b and one S_b per block b: ``X_ij + T_b(i) + S_b(j) - mean`` (Dehak 2022, Lemma II.1)."""
+    FULL = "full"
+    """One T_i,b per vertex i and block b: ``X_ij + T_i,b(j) - (1/G) sum_b T_i,b``, a larger family."""
 
 
 def pole_disk(lyapunov: Operand, product: Operand, centre: Fraction, radius: Fraction) -> Expression:
@@ -50,19 +65,24 @@ def single_sum(
     entry: Callable[[int], Expression],
     count: int,
     slack_blocks: npt.NDArray[np.intp] | None = None,
-) -> None:
-    """Require ``sum_i w_i X_i < 0`` for all convex weights: ``X_i < 0``, or ``X_i + T_k(i) - mean < 0`` with slack.
+) -> tuple[Variable, ...]:
+    """Require ``sum_i w_i X_i < 0`` for all convex weights: ``X_i < 0``, or ``X_i + T_b(i) - mean < 0`` with slack.
 
     Args:
         problem, name, count, slack_blocks: as in `double_sum`.
         entry: X_i; only its symmetric part matters.
+
+    Returns:
+        The slack matrices.
     """
     entries = [entry(i) for i in range(count)]
+    slacks: tuple[Variable, ...] = ()
     if slack_blocks is not None and len(set(slack_blocks)) > 1:
-        slack = _zero_mean(f"T {name}", slack_blocks, entries[0].shape[0])
+        slack, slacks = _zero_mean(f"T {name}", slack_blocks, entries[0].shape[0])
         entries = [X + T for X, T in zip(entries, slack, strict=True)]
     for i, X in enumerate(entries):
         problem.negative(f"{name} {i}", X)
+    return slacks
 
 
 def double_sum(
@@ -71,12 +91,13 @@ def double_sum(
     entry: Callable[[int, int], Expression],
     count: int,
     slack_blocks: npt.NDArray[np.intp] | None = None,
-) -> None:
+    *,
+    slack: Slack = Slack.THESIS,
+) -> tuple[Variable, ...]:
     """Require ``sum_ij w_i w_j X_ij < 0`` for all convex weights (Tuan et al. 2001, Theorem 2.2).
 
-    ``X_ii < 0`` and ``2/(N-1) X_ii + X_ij + X_ji < 0`` for all ordered i != j; N vertices. With slack matrices
-    ``T_k, S_k``, one pair per block k of a block polytope, X_ij is replaced by ``X_ij + T_k(i) + S_k(j) - mean``: the
-    weights of a block sum to 1/G, so the addition has mean zero (Dehak 2022, Lemma II.1).
+    ``X_ii < 0`` and ``2/(N-1) X_ii + X_ij + X_ji < 0`` for all ordered i != j; N vertices. Slack matrices are added to
+    X_ij first, see `Slack`.
 
     Args:
         problem: receives the inequalities, named ``"<name> i j"``.
@@ -84,21 +105,38 @@ def double_sum(
         entry: X_ij; only its symmetric part matters.
         count: N.
         slack_blocks: block of every vertex, or None for no slack (a single block has none: T - mean = 0).
+        slack: which family.
+
+    Returns:
+        The slack matrices.
     """
     grid = [[entry(i, j) for j in range(count)] for i in range(count)]
-    if slack_blocks is not None and len(set(slack_blocks)) > 1:
-        T, S = (_zero_mean(f"{letter} {name}", slack_blocks, grid[0][0].shape[0]) for letter in "TS")
-        grid = [[grid[i][j] + T[i] + S[j] for j in range(count)] for i in range(count)]
+    slacks: tuple[Variable, ...] = ()
+    if slack_blocks is not None and len(set(slack_blocks)) > 1 and slack is not Slack.NONE:
+        shift, slacks = _double_slack(name, slack_blocks, grid[0][0].shape[0], slack)
+        grid = [[grid[i][j] + shift(i, j) for j in range(count)] for i in range(count)]
     for i in range(count):
         problem.negative(f"{name} {i} {i}", grid[i][i])
         for j in range(count):
             if i != j:
                 problem.negative(f"{name} {i} {j}", grid[i][i] * Fraction(2, count - 1) + grid[i][j] + grid[j][i])
+    return slacks
 
 
-def _zero_mean(name: str, blocks: npt.NDArray[np.intp], size: int) -> list[Expression]:
-    """``T_k(i) - (1/G) sum_k T_k`` for every vertex i, one symmetric unknown T_k per block k."""
+def _double_slack(
+    name: str, blocks: npt.NDArray[np.intp], size: int, slack: Slack
+) -> tuple[Callable[[int, int], Expression], tuple[Variable, ...]]:
+    """The addition to X_ij, and its unknowns."""
+    if slack is Slack.THESIS:
+        (T, ofT), (S, ofS) = (_zero_mean(f"{letter} {name}", blocks, size) for letter in "TS")
+        return lambda i, j: T[i] + S[j], ofT + ofS
+    rows = [_zero_mean(f"T {name} {i}", blocks, size) for i in range(len(blocks))]
+    return lambda i, j: rows[i][0][j], tuple(variable for _, row in rows for variable in row)
+
+
+def _zero_mean(name: str, blocks: npt.NDArray[np.intp], size: int) -> tuple[list[Expression], tuple[Variable, ...]]:
+    """``T_b(i) - (1/G) sum_b T_b`` for every vertex i, and the symmetric unknowns T_b, one per block b."""
     groups = sorted(set(blocks.tolist()))
-    T = {k: Variable(f"{name} {k}", size, symmetric=True).expression for k in groups}
-    mean = sum((T[k] for k in groups), zeros(size, size)) * Fraction(-1, len(groups))
-    return [T[k] + mean for k in blocks.tolist()]
+    T = {b: Variable(f"{name} {b}", size, symmetric=True) for b in groups}
+    mean = sum((variable.expression for variable in T.values()), zeros(size, size)) * Fraction(-1, len(groups))
+    return [T[b] + mean for b in blocks.tolist()], tuple(T.values())

@@ -1,0 +1,75 @@
+"""Theorem II.6: quadratic stabilisation of regular descriptor systems without an extended state.
+
+For ``E(z) x' = A(z) x + B(z) u`` with E(z) invertible, the law ``u = F(z) E(z)^-T P^-1 x`` makes ``V = x' P^-1 x``
+decrease if ``He[(A + alpha E) P E' + B F] < 0`` at every z. Slack matrices L(z), R(z) separate A(z) from P E(z)', so
+that the inequality is quadratic in the weights:
+
+    He [A_i L_j + B_i F_j, A_i R_j; P E_i' - L_j, -R_j] + slack < 0    for all sums over i, j
+
+(A_i stands for A_i + alpha E_i.) The printed slack sums over the wrong index; here they have mean zero.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from quasilpv.conditions.blocks import double_sum
+from quasilpv.conditions.condition import (
+    Condition,
+    Feedback,
+    FloatArray,
+    Options,
+    Statement,
+    Values,
+    require_regular,
+    shared_gains,
+)
+from quasilpv.lmi import Expression, Problem, Variable, block, he
+from quasilpv.polytopes import PolytopicModel
+
+
+def build(model: PolytopicModel, options: Options) -> Statement:
+    """State Theorem II.6 for a regular system.
+
+    Unknowns ``P = P' > 0`` (n, n), and per vertex L_j, R_j (n, n) and F_j (m, n).
+
+    Raises:
+        InputError: the system has algebraic states.
+    """
+    require_regular(model, "II.6")
+    n, count = model.order, model.vertex_count
+    P = Variable("P", n, symmetric=True)
+    L, R = ([Variable(f"{name}{j}", n) for j in range(count)] for name in "LR")
+    F = shared_gains(model, n)
+    alpha = Fraction(options.decay_rate)
+
+    def entry(i: int, j: int) -> Expression:
+        A = model.A[i] + model.E[i] * alpha
+        return he(block([[A @ L[j] + model.B[i] @ F[j], A @ R[j]], [P @ model.E[i].T - L[j], -R[j]]]))
+
+    problem = Problem()
+    problem.positive("P", P)
+    slacks = double_sum(problem, "Xi", entry, count, model.polytope.block_index, slack=options.slack)
+
+    def feedback(values: Values) -> Feedback:
+        inverse = np.linalg.inv(values[P])
+
+        def gain(z: FloatArray) -> FloatArray:
+            F_z = model.polytope.evaluate(np.stack([values[Fj] for Fj in F]), z)
+            E_z = model.system.E.evaluate(z)
+            return np.asarray(F_z @ np.linalg.solve(E_z.T, inverse))
+
+        return Feedback(values[P], gain)
+
+    return Statement(problem, feedback, slacks)
+
+
+CONDITION = Condition(
+    id="II.6",
+    summary="regular systems: descriptor law F(z) E(z)^-T P^-1 x, no extended state",
+    reference="Dehak 2022, Theorem II.6, with the slack sums corrected",
+    representation="per-premise@0",
+    build=build,
+)
