@@ -16,6 +16,7 @@ LAYERS = (
     {"", "errors"},
     {"systems"},
     {"polytopes"},
+    {"loops"},
     {"lmi"},
     {"conditions"},
     {"synthesis"},

@@ -237,7 +237,7 @@ def test_when_an_artifact_is_sound_expect_exit_0_and_the_evidence_it_carries(
         ("dob-acceleration", scaled("law", "observer", 0, by=1.0 - 1e-7)),
         ("dob-torque", scaled("law", "feedback", *TABLE, 0, 0, by=1.0 + 1e-7)),
         ("dob-torque", scaled("law", "observer", *TABLE, 0, 0, by=1.0 - 1e-8)),
-        ("dob-torque", scaled("law", "inertia", *TABLE, 0, 0, by=1.0 + 1e-8)),
+        ("dob-torque", scaled("law", "inertia", *TABLE, 0, 0, by=1.0 + 1e-14)),
         ("dob-torque", scaled("witness", "feedback", "gamma", by=1.1)),
         ("dob-torque", scaled("witness", "observer", "disk_rad_s", by=1.1)),
     ],

@@ -16,8 +16,7 @@ from flint import fmpq
 from quasilpv import __version__
 from quasilpv.artifact import Artifact, Program, compile_program
 from quasilpv.artifact.canonical import document_hash
-from quasilpv.certificate import CHECKERS, verify
-from quasilpv.certificate.gate import robust_gate
+from quasilpv.certificate import CHECKERS, gate, verify
 from quasilpv.errors import ClaimError
 from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, TrackingDesign, synthesise
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
@@ -86,37 +85,27 @@ def checked_artifact(design: TrackingDesign, allow_unverified: bool = False) -> 
     if design.controller not in CHECKERS:
         return Artifact.from_document(content)
     verdict = verify(content, content["name"])
-    gate = _gate_findings(design, content)
+    samples = float(design.inputs["specification"]["delay_samples"])
+    found = gate(content, content["name"], fmpq(*samples.as_integer_ratio())).to_document()
     failures = [f"{name}: does not hold in exact arithmetic" for name in verdict.failed]
-    if not gate["passed"]:
-        failures.append(_why_not_passed(gate))
+    if not found["passed"]:
+        failures.append(_why_not_passed(found))
     if failures and not allow_unverified:
         more = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
         raise ClaimError(f"{content['name']}: not released: {failures[0]}{more}")
-    evidence = {**(content["verification"] or {}), "certificate": verdict.findings(), "gate": gate}
+    evidence = {**(content["verification"] or {}), "certificate": verdict.findings(), "gate": found}
     if failures:
         evidence["released_unverified"] = True
     return Artifact.from_document({**content, "verification": evidence})
 
 
-def _gate_findings(design: TrackingDesign, content: Mapping[str, Any]) -> dict[str, Any]:
-    """What the gate of the law's kind found: a proof at the acceleration level, a grid check at the torque level."""
-    if design.controller == "dob-acceleration":
-        samples = design.inputs["specification"]["delay_samples"]
-        return robust_gate(content, content["name"], fmpq(*float(samples).as_integer_ratio())).to_document()
-    grid = ("passed", "proved", "worst_growth_rate_per_s", "growth_rates_per_s", "loops")
-    where = design.report["worst_growth_rate_at"]
-    return {**{name: design.report[name] for name in grid}, "where": where}
-
-
-def _why_not_passed(gate: Mapping[str, Any]) -> str:
+def _why_not_passed(found: Mapping[str, Any]) -> str:
     """Half a line: what the gate wanted and what it found."""
-    needed, margin = gate.get("needed_range"), gate.get("inertia_margin")
-    if needed and margin:
+    rate, needed, margin = (found[name] for name in ("worst_growth_rate_per_s", "needed_range", "inertia_margin"))
+    if needed and margin and "grid" not in found:
         (a, b), (low, high) = needed, margin
         upper = "infinity" if high is None else f"{high:.4g}"
         return f"robust gate: needed range [{a:.4g}, {b:.4g}] not proved inside the inertia margin [{low:.4g}, {upper}]"
-    rate = gate["worst_growth_rate_per_s"]
     return "robust gate: not passed" + ("" if rate is None else f", worst growth rate {rate:.3g} 1/s")
 
 

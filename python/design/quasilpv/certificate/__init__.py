@@ -8,20 +8,49 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeAlias
+
+from flint import fmpq
 
 from quasilpv.certificate.claims import Claim, Verification
+from quasilpv.certificate.design_model import check_design_model
+from quasilpv.certificate.gate import RobustGate, robust_gate
+from quasilpv.certificate.gate_data import HALF_A_SAMPLE, law_kind
+from quasilpv.certificate.grid_gate import GridGate, grid_gate
 from quasilpv.certificate.sampled_chains import check_dob_acceleration
 from quasilpv.certificate.torque_law import check_dob_torque
 from quasilpv.errors import InputError
 
-__all__ = ["CHECKERS", "Claim", "Verification", "verify"]
+__all__ = ["CHECKERS", "GATES", "Claim", "Gate", "Verification", "gate", "verify"]
 
-CHECKERS: Mapping[str, Callable[[Mapping[str, Any]], tuple[Claim, ...]]] = {
-    "dob-acceleration": check_dob_acceleration,
-    "dob-torque": check_dob_torque,
+Checker: TypeAlias = Callable[[Mapping[str, Any]], tuple[Claim, ...]]
+Gate: TypeAlias = RobustGate | GridGate
+
+CHECKERS: Mapping[str, tuple[Checker, ...]] = {
+    "dob-acceleration": (check_dob_acceleration, check_design_model),
+    "dob-torque": (check_dob_torque, check_design_model),
 }
-"""How each law kind is checked; kinds without an entry make no claim."""
+"""How each law kind is checked: its inequalities, then its design model; kinds without an entry make no claim."""
+
+GATES: Mapping[str, Callable[[Mapping[str, Any], str, fmpq], Gate]] = {
+    "dob-acceleration": robust_gate,
+    "dob-torque": grid_gate,
+}
+"""The robust gate of each law kind: a proof where the loop decouples, a grid elsewhere."""
+
+
+def gate(document: Mapping[str, Any], source: str = "artifact", delay_samples: fmpq = HALF_A_SAMPLE) -> Gate:
+    """Put an artifact to the robust gate of its law kind.
+
+    Args:
+        document: the artifact as a JSON tree.
+        source: what to call it in errors.
+        delay_samples: the transport delay it has to tolerate, in samples.
+
+    Raises:
+        InputError: the law kind has no gate, or what `robust_gate` or `grid_gate` refuse.
+    """
+    return GATES[law_kind(document, source, GATES)](document, source, delay_samples)
 
 
 def verify(document: Mapping[str, Any], source: str = "artifact") -> Verification:
@@ -32,14 +61,14 @@ def verify(document: Mapping[str, Any], source: str = "artifact") -> Verificatio
         source: what to call it in errors.
 
     Raises:
-        InputError: the law kind makes no claim, or the witness is missing or malformed.
+        InputError: the law kind makes no claim, the witness is missing or malformed, or the robot is no serial arm.
     """
     start = time.perf_counter()
     kind = document["law"]["kind"]
     if kind not in CHECKERS:
         raise InputError(source, "law.kind", kind, f"one with a certificate: {', '.join(CHECKERS)}")
     try:
-        claims = CHECKERS[kind](document)
+        claims = tuple(claim for check in CHECKERS[kind] for claim in check(document))
     except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise InputError(source, "witness", f"{type(error).__name__}: {error}", f"what {kind} needs") from error
     return Verification(claims, time.perf_counter() - start)

@@ -66,6 +66,11 @@ def symmetric(upper: Sequence[Sequence[fmpq_mat | None]]) -> fmpq_mat:
     return stack(full)
 
 
+def magnitude(square: fmpq_mat) -> fmpq_mat:
+    """Absolute values, entry by entry."""
+    return fmpq_mat(square.nrows(), square.ncols(), [abs(entry) for entry in square.entries()])
+
+
 def trace(square: fmpq_mat) -> fmpq:
     """Sum of the diagonal."""
     return sum((square[i, i] for i in range(square.nrows())), fmpq(0))

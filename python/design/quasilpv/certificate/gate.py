@@ -17,14 +17,13 @@ import numpy as np
 import numpy.typing as npt
 from flint import fmpq, fmpq_poly
 
-from quasilpv.certificate.gate_data import arm_inertia_data, loop_data
+from quasilpv.certificate.gate_data import HALF_A_SAMPLE, arm_inertia_data, loop_data
 from quasilpv.certificate.gate_delay import DelayMargin, delay_margin
 from quasilpv.certificate.gate_loop import AccelerationLoopData, CharacteristicPolynomial, Controller
 from quasilpv.certificate.gate_margin import InertiaMargin, inertia_margin
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, Place, needed_range
 from quasilpv.certificate.gate_rationals import float_at_most, to_float
 
-HALF_A_SAMPLE = fmpq(1, 2)
 GROWTH_RATIOS = 61
 CURVE_POINTS = 41
 

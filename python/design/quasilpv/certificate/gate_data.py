@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
+
+from flint import fmpq
 
 from quasilpv.certificate.gate_inertia import ArmInertiaData, InertiaBlock, LinkData, Pair
 from quasilpv.certificate.gate_loop import AccelerationLoopData
 from quasilpv.errors import InputError
 
 LAW_KIND = "dob-acceleration"
+HALF_A_SAMPLE = fmpq(1, 2)
+"""The transport delay a gate asks for if nobody says otherwise."""
+
 PAYLOAD_RULE = {"inertia_about_com": "unchanged", "fraction": [0.0, 1.0]}
+
+
+def law_kind(document: Mapping[str, Any], source: str, known: Collection[str]) -> str:
+    """The law kind of an artifact, one of those given.
+
+    Raises:
+        InputError: another one.
+    """
+    kind = document["law"]["kind"]
+    if kind not in known:
+        raise InputError(source, "law.kind", kind, f"one with this gate: {', '.join(known)}")
+    return str(kind)
 
 
 def loop_data(document: Mapping[str, Any], source: str = "artifact") -> AccelerationLoopData:
@@ -23,9 +40,8 @@ def loop_data(document: Mapping[str, Any], source: str = "artifact") -> Accelera
     Raises:
         InputError: another law than `dob-acceleration`, whose loop does not decouple into one scalar loop.
     """
+    law_kind(document, source, (LAW_KIND,))
     law = document["law"]
-    if law["kind"] != LAW_KIND:
-        raise InputError(source, "law.kind", law["kind"], f"{LAW_KIND}, whose frozen loop decouples")
     feedback = law["feedback"]
     l1, l2, l3, l4 = (float(gain) for gain in law["observer"])
     return AccelerationLoopData(

@@ -20,7 +20,7 @@ from typing import TypeAlias
 
 from flint import fmpq_mat, fmpq_poly
 
-from quasilpv.certificate.exact_matrices import is_symmetric, matrix, rational, zero
+from quasilpv.certificate.exact_matrices import is_symmetric, magnitude, matrix, rational, zero
 from quasilpv.errors import InputError
 
 Pair: TypeAlias = tuple[int, int]
@@ -151,7 +151,7 @@ def design_inertia(data: ArmInertiaData) -> DesignInertia:
             elif len(premises) == 1:
                 slopes[data.premise_pairs[premises[0]]] += absolute
             else:  # every premise is a cosine, so their product is at most 1
-                rest += fmpq_mat(n, n, [abs(entry) for entry in absolute.entries()])
+                rest += magnitude(absolute)
     return DesignInertia(constant, slopes, rest)
 
 

@@ -27,7 +27,7 @@ from quasilpv.certificate.gate_cells import (
     cosine_enclosure,
     smallest_eigenvalues,
 )
-from quasilpv.certificate.gate_inertia import ArmInertiaData, design_inertia, true_inertia
+from quasilpv.certificate.gate_inertia import ArmInertiaData, Pair, design_inertia, true_inertia
 from quasilpv.certificate.gate_rationals import float_at_least, float_at_most, to_float, to_floats
 from quasilpv.errors import InputError
 
@@ -122,16 +122,28 @@ class InertiaPair:
         Raises:
             numpy.linalg.LinAlgError: M_n is not positive definite at one of the points.
         """
-        absolute = np.cumsum(np.column_stack([np.zeros(len(points)), points[:, :-1]]), axis=1)
-        cosines = np.cos(absolute[:, :, None] - absolute[:, None, :])
+        cosines = _cosines(np.column_stack([np.zeros(len(points)), points[:, :-1]]))
         powers = points[:, -1, None] ** np.arange(DEGREE + 1)
         true = np.einsum("ijp,np->nij", self._true_floats, powers) * cosines
-        design = np.tile(self._design_floats, (len(points), 1, 1))
-        for (i, j), slope in self._slope_floats.items():
-            design += cosines[:, i, j, None, None] * slope
-        factor = np.linalg.cholesky(design)
+        factor = np.linalg.cholesky(self._absolute_design_inertia(cosines))
         half = np.linalg.solve(factor, true)
         return np.asarray(np.linalg.eigvalsh(np.linalg.solve(factor, half.transpose(0, 2, 1))))
+
+    def true_inertia_at(self, angles: FloatArray, payload_fraction: float) -> FloatArray:
+        """M_t in doubles and joint coordinates, (N, n, n), at configurations (N, n) with one payload."""
+        D = self._true_floats @ payload_fraction ** np.arange(DEGREE + 1)
+        return _in_joint_angles(D * _cosines(angles))
+
+    def design_inertia_at(self, angles: FloatArray) -> FloatArray:
+        """M_n in doubles and joint coordinates, (N, n, n), at configurations (N, n)."""
+        return _in_joint_angles(self._absolute_design_inertia(_cosines(angles)))
+
+    def _absolute_design_inertia(self, cosines: FloatArray) -> FloatArray:
+        """M_n in absolute angles, (N, n, n)."""
+        design = np.tile(self._design_floats, (len(cosines), 1, 1))
+        for (i, j), slope in self._slope_floats.items():
+            design += cosines[:, i, j, None, None] * slope
+        return design
 
     def samples(self) -> FloatArray:
         """About `SAMPLES` points (theta_2 ... theta_n, f) of the domain, its bounds included."""
@@ -243,11 +255,34 @@ class _Side:
         return int(self._sign) * fmpq(int(np.ceil(wide * 2**BOUND_BITS)), 1 << BOUND_BITS)
 
 
-def _require_premises_inside_box(data: ArmInertiaData) -> None:
+def premise_ranges(data: ArmInertiaData) -> tuple[tuple[fmpq, fmpq], ...]:
+    """Proved bounds of every premise over the operating domain, tight to `BOX_BITS` bits."""
+    return tuple(cosine_range(data, pair) for pair in data.premise_pairs)
+
+
+def cosine_range(data: ArmInertiaData, pair: Pair) -> tuple[fmpq, fmpq]:
+    """Proved bounds of ``cos(theta_{i+1} + ... + theta_j)`` over the operating domain, tight to `BOX_BITS` bits."""
+    i, j = pair
+    low, high = (sum((rational(x[side]) for x in data.angle_rad[i + 1 : j + 1]), fmpq(0)) for side in (0, 1))
+    below, above = cosine_enclosure(low, high, BOX_BITS)
     unit = 1 << BOX_BITS
-    for p, (i, j) in enumerate(data.premise_pairs):
-        low, high = (sum((rational(x[side]) for x in data.angle_rad[i + 1 : j + 1]), fmpq(0)) for side in (0, 1))
-        below, above = cosine_enclosure(low, high, BOX_BITS)
+    return fmpq(below, unit), fmpq(above, unit)
+
+
+def _require_premises_inside_box(data: ArmInertiaData) -> None:
+    for p, (below, above) in enumerate(premise_ranges(data)):
         lower, upper = data.premise_lower[p], data.premise_upper[p]
-        if fmpq(below, unit) < rational(lower) or fmpq(above, unit) > rational(upper):
+        if below < rational(lower) or above > rational(upper):
             raise InputError("law", f"inertia: box of premise {p}", f"[{lower}, {upper}]", "its range on the domain")
+
+
+def _cosines(angles: FloatArray) -> FloatArray:
+    """``cos(alpha_k - alpha_l)`` at configurations (N, n), (N, n, n)."""
+    absolute = np.cumsum(angles, axis=1)
+    return np.asarray(np.cos(absolute[:, :, None] - absolute[:, None, :]))
+
+
+def _in_joint_angles(absolute: FloatArray) -> FloatArray:
+    """``S' X S`` with S the lower triangle of ones."""
+    S = np.tri(absolute.shape[-1])
+    return np.asarray(S.T @ absolute @ S)

@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 from flint import fmpq, fmpq_mat
 
 from quasilpv.certificate.claims import Claim
@@ -20,6 +22,7 @@ from quasilpv.certificate.exact_matrices import matrix, rational
 COLLAPSE_TOLERANCE = fmpq(1, 1 << 40)
 """Largest error of a collapsed entry, relative to that entry's largest magnitude over the vertices: about 9e-13."""
 
+FloatArray = npt.NDArray[np.float64]
 Rows = Sequence[Sequence[float]]
 
 
@@ -64,6 +67,19 @@ class VertexTable:
     def vertices(self) -> tuple[fmpq_mat, ...]:
         """The vertices X_i, exactly."""
         return tuple(matrix(vertex) for vertex in self.doubles)
+
+    def evaluate(self, premises: FloatArray) -> FloatArray:
+        """``X(z)`` in doubles at B premise vectors, (B, p), clamped to the box as at run time; (B, rows, columns)."""
+        low, high = np.array(self.lower), np.array(self.upper)
+        share = (np.clip(premises, low, high) - low) / (high - low)
+        weights = []
+        for block in self.blocks:
+            own = np.full((len(share), 1), 1.0 / len(self.blocks))
+            for p in block:  # the first premise is the most significant bit
+                upper = share[:, p, None]
+                own = np.stack([own * (1.0 - upper), own * upper], axis=2).reshape(len(share), -1)
+            weights.append(own)
+        return np.asarray(np.tensordot(np.concatenate(weights, axis=1), np.array(self.doubles), axes=1))
 
     def collapse_claim(self, name: str) -> tuple[Claim, ...]:
         """The claim that the collapsed form stays within `COLLAPSE_TOLERANCE`; none if there is no collapsed form."""

@@ -1,4 +1,4 @@
-"""``design robust``: the robust gate, a proof for every posture, payload and small delay, or a refusal."""
+"""``design robust``: the robust gate; a proof for every posture, payload and small delay, or a grid check."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from flint import fmpq
 from matplotlib.figure import Figure
 
 from quasilpv.artifact import read_artifact
-from quasilpv.certificate.gate import RobustGate, margin_curve, robust_gate
+from quasilpv.certificate import Gate, gate
+from quasilpv.certificate.gate import RobustGate, margin_curve
 from quasilpv.certificate.gate_rationals import to_float
+from quasilpv.certificate.grid_gate import GridGate, growth_curves
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
+from quasilpv.figures.growth import growth_figure
 from quasilpv.figures.margins import margin_figure
 from quasilpv.figures.style import save
 
-FIGURE_NAME = "inertia-margin"
+MARGIN_FIGURE, GROWTH_FIGURE = "inertia-margin", "growth-rate"
 BEYOND_THE_MARGIN = fmpq(3, 2)
 SHORTEST_CURVE_SAMPLES = fmpq(1)
 
@@ -26,36 +29,67 @@ def robust_command(
     *,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", metavar="DIR", help="Draw the inertia margin against the delay into this folder."),
+        typer.Option("-o", "--out", metavar="DIR", help="Draw what the gate found into this folder."),
     ] = None,
     json: JsonOption = False,
 ) -> int:
-    """Prove that the frozen loop is stable in every posture, with every payload, with up to half a sample of delay.
+    """Ask whether the frozen loop is stable in every posture, with every payload, with up to half a sample of delay.
 
-    Exit code 1 if that is not proved. The gate reads nothing but the artifact and shares no code with the design.
+    For dob-acceleration the answer is a proof; for torque-level laws it is a check on a grid, and says so. Exit code 1
+    if the gate is not passed. It reads nothing but the artifact.
 
     \b
     Example:
       design robust out/arm3/artifact.json -o out/arm3
     """
-    gate = robust_gate(read_artifact(artifact).content(), str(artifact))
+    found = gate(read_artifact(artifact).content(), str(artifact))
     if json:
-        print_json(gate.to_document())
+        print_json(found.to_document())
     else:
-        print_table(str(artifact), ("", ""), _rows(gate), left_columns=2)
-        print(_verdict(gate))
+        rows, verdict = (_rows(found), _verdict(found)) if isinstance(found, RobustGate) else _grid_answer(found)
+        print_table(str(artifact), ("", ""), rows, left_columns=2)
+        print(verdict)
     if out is not None:
-        for path in save(_figure(gate), out / FIGURE_NAME):
+        for path in _draw(found, out):
             print_note(f"wrote {path}")
-    return 0 if gate.passed else 1
+    return 0 if found.passed else 1
 
 
-def _figure(gate: RobustGate) -> Figure:
+def _draw(found: Gate, out: Path) -> list[Path]:
+    """The figure of either gate."""
+    if isinstance(found, GridGate):
+        return save(growth_figure(found, growth_curves(found)), out / GROWTH_FIGURE)
+    return save(_margin_figure(found), out / MARGIN_FIGURE)
+
+
+def _margin_figure(gate: RobustGate) -> Figure:
     """The margin from no delay to well beyond the delay margin."""
     longest = max(SHORTEST_CURVE_SAMPLES, gate.specified_delay_samples * 2)
     if gate.delays is not None and gate.delays.proved is not None:
         longest = max(longest, gate.delays.proved * BEYOND_THE_MARGIN)
     return margin_figure(gate, margin_curve(gate.loop, longest))
+
+
+def _grid_answer(found: GridGate) -> tuple[list[tuple[str, str]], str]:
+    """Rows and verdict of a grid check."""
+    period = found.plants.law.sample_period_s
+    delay = found.specified_delay_s / period
+    (worst, worst_delay_s), margin = found.worst_case, found.delay_margin_s
+    angles = ", ".join(f"{angle:.3g}" for angle in worst.angle_rad)
+    rows = [
+        ("worst growth rate", f"{worst.growth_rate_per_s:.3g} 1/s"),
+        ("  at joint angles", f"{angles} rad"),
+        ("  with payload fraction", f"{worst.payload_fraction:.3g}"),
+        ("  and a delay of", f"{worst_delay_s * 1e3:.3g} ms"),
+        ("delay margin", "none" if margin is None else f"{margin * 1e3:.4g} ms = {margin / period:.3g} samples"),
+        (f"factors on the true inertia with {delay:g} samples of delay", _interval(*found.factors or (0.0, 0.0))),
+        (f"inertia margin for M_t = rho M_n with {delay:g} samples of delay", _interval(*found.margin or (0.0, 0.0))),
+        ("needed range of M_t/M_n (proved)", _interval(*found.needed.to_floats()) if found.needed else "none"),
+        ("loops", f"{len(found.plants)} ({len(found.plants.angles)} postures, {len(found.plants.inertia)} payloads)"),
+    ]
+    if found.passed:
+        return rows, "passed: stable at every point of the grid (frozen loop); a grid check, not a proof"
+    return rows, "NOT passed: a loop of the grid is not stable up to the specified delay"
 
 
 def _rows(gate: RobustGate) -> list[tuple[str, str]]:

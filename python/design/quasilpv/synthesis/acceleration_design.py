@@ -171,13 +171,12 @@ def design_acceleration_law(
         InfeasibleError: no point of the search meets the margins and the torque activity.
     """
     needed = needed_inertia_range(robot)
-    quantum = 2.0 * math.pi / 2**specification.encoder_bits
     search = _Search(
         robot,
         specification,
         needed,
         activity_bound_nm=specification.torque_activity * float(np.linalg.norm(robot.limits.torque_nm)),
-        noise_nm=quantum / math.sqrt(12.0) * largest_inertia_norm(robot),
+        noise_nm=specification.angle_noise_rad * largest_inertia_norm(robot),
     )
     grid = list(product(FEEDBACK_BANDWIDTHS, OBSERVER_BANDWIDTHS, FILTER_TIMES))
     for point in grid:

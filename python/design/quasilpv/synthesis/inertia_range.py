@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.loops.loop_grid import configurations
 from quasilpv.systems.registry import Robot
 
 CONFIGURATIONS = 2000
@@ -24,25 +23,13 @@ class InertiaRange:
     where_highest: tuple[tuple[float, ...], float]
 
 
-def configurations(robot: Robot, count: int = CONFIGURATIONS) -> npt.NDArray[np.float64]:
-    """Grid of about ``count`` configurations of the operating domain, bounds included, shape (N, n).
-
-    The inertia of a serial chain does not depend on its first joint, which stays at the middle of its interval.
-    """
-    intervals = robot.domain.angle_rad
-    per_joint = max(3, round(count ** (1.0 / max(1, len(intervals) - 1))))
-    first = np.array([sum(intervals[0]) / 2.0])
-    axes = [first, *(np.linspace(low, high, per_joint) for low, high in intervals[1:])]
-    return np.array(list(itertools.product(*axes)))
-
-
 def needed_inertia_range(robot: Robot, count: int = CONFIGURATIONS) -> InertiaRange:
     """Range of ``M_t / M_n`` for M_n the nominal inertia, over a grid of reachable configurations and payloads.
 
     Reachable configurations, not corners of the premise box: the cosines are dependent, and at some corners the inertia
     is not even positive definite. A grid, so a numerical range: the proof is the business of the certificate.
     """
-    postures = configurations(robot, count)
+    postures = configurations(robot.domain.angle_rad, count)
     factor = np.linalg.cholesky(np.array([robot.model.inertia(theta) for theta in postures]))
     found: list[tuple[float, float, int, int, float]] = []
     for fraction in np.linspace(0.0, 1.0, PAYLOAD_FRACTIONS):
@@ -61,4 +48,6 @@ def needed_inertia_range(robot: Robot, count: int = CONFIGURATIONS) -> InertiaRa
 
 def largest_inertia_norm(robot: Robot) -> float:
     """Largest Frobenius norm of the nominal inertia over the operating domain, kg m^2."""
-    return max(float(np.linalg.norm(robot.model.inertia(theta))) for theta in configurations(robot, 200))
+    return max(
+        float(np.linalg.norm(robot.model.inertia(theta))) for theta in configurations(robot.domain.angle_rad, 200)
+    )

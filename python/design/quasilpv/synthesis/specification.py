@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from math import isfinite
+from math import isfinite, pi, sqrt
 from typing import Any
 
 from quasilpv.errors import InputError
@@ -57,6 +57,11 @@ class Specification:
     def delay_s(self) -> float:
         """The delay that must lie inside the margin."""
         return self.delay_samples * self.sample_period_s
+
+    @property
+    def angle_noise_rad(self) -> float:
+        """Standard deviation of the rounding error of the encoders, uniform over one count."""
+        return 2.0 * pi / 2.0**self.encoder_bits / sqrt(12.0)
 
     def to_document(self) -> dict[str, Any]:
         """JSON-able copy, part of the design inputs."""

@@ -23,18 +23,10 @@ import numpy.typing as npt
 from quasilpv.conditions.iv11_reduced import FeedbackPoint, ObserverPoint, feedback_condition, observer_condition
 from quasilpv.errors import InfeasibleError
 from quasilpv.lmi import to_rational
-from quasilpv.polytopes import BlockPolytope
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
-from quasilpv.synthesis.grid_gate import (
-    CONFIGURATIONS,
-    PAYLOAD_FRACTIONS,
-    GateResult,
-    PlantGrid,
-    ScheduledLaw,
-    grid_gate,
-)
+from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.synthesis.specification import Specification
-from quasilpv.systems.premise import Premise
+from quasilpv.synthesis.torque_schedule import Schedule, ScheduledLaw, ScheduledPlants, schedule
 from quasilpv.systems.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
@@ -48,11 +40,6 @@ OBSERVER_DECAY = 1.0 / 16.0
 OBSERVER_NOISE = 0.1
 """Weight of measurement noise against the second derivative of the disturbance, in the observer's own units."""
 
-LARGEST_SPREAD = 3.0
-"""Premises are scheduled as long as eig(M_i^-1 M_j) stays below this over all pairs of vertices. One observer matrix Q
-in torque coordinates must serve all of them: already for a single joint the squared L2 gain grows tenfold per unit of
-this ratio, and between 5 and 6 there is no Q at all."""
-
 BACK_OFFS = (0.02, 0.1, 0.3)
 
 # Search grid, in units of the sample rate (disks), of the sample period (filter) and of the nominal inertia (scale).
@@ -60,53 +47,6 @@ FEEDBACK_DISKS = tuple(float(w) for w in np.geomspace(0.01, 0.08, 16))
 OBSERVER_DISKS = (0.3, 0.4, 0.5, 0.65, 0.8)
 FILTER_TIMES = (2.0, 4.0)
 INERTIA_SCALES = (0.6, 0.7, 0.8, 0.9, 1.0)
-SCREEN_CONFIGURATIONS = 9
-
-
-@dataclass(frozen=True, eq=False)
-class Schedule:
-    """The measured premises the gains depend on, and the design inertia on their box.
-
-    Attributes:
-        premises: those scheduled; the others sit at the middle of their interval, and what they change is disturbance.
-        polytope: Takagi-Sugeno representation of their box: for up to two premises no other has tighter vertices.
-        inertia: vertices of the nominal inertia, (N, n, n), kg m^2.
-        spread: largest eigenvalue of M_i^-1 M_j over the vertices.
-    """
-
-    premises: tuple[Premise, ...]
-    polytope: BlockPolytope
-    inertia: FloatArray
-    spread: float
-
-
-def schedule(robot: Robot) -> Schedule:
-    """As many inertia premises as keep the spread below `LARGEST_SPREAD`; among equals the smallest spread.
-
-    Raises:
-        InfeasibleError: not even the empty set leaves a positive definite inertia.
-    """
-    count = len(robot.model.inertia_premises(robot.domain))
-    for size in range(count, -1, -1):
-        candidates = [_schedule_of(robot, chosen) for chosen in itertools.combinations(range(count), size)]
-        best = min(candidates, key=lambda candidate: candidate.spread)
-        if best.spread < LARGEST_SPREAD:
-            return best
-    raise InfeasibleError(f"{robot.id}: no dob-torque design: the inertia at the middle of the box is not definite")
-
-
-def _schedule_of(robot: Robot, chosen: tuple[int, ...]) -> Schedule:
-    premises, affine = robot.model.inertia_premises(robot.domain), robot.model.inertia_affine()
-    middle = np.array([(p.lower + p.upper) / 2.0 for p in premises])
-    middle[list(chosen)] = 0.0
-    scheduled = tuple(premises[k] for k in chosen)
-    polytope = BlockPolytope.takagi_sugeno([p.lower for p in scheduled], [p.upper for p in scheduled])
-    vertices = polytope.vertices(affine.evaluate(middle), affine.coefficients[list(chosen)])
-    vertices = (vertices + vertices.swapaxes(1, 2)) / 2.0
-    if np.linalg.eigvalsh(vertices).min() <= 0.0:
-        return Schedule(scheduled, polytope, vertices, math.inf)
-    pairs = np.linalg.solve(vertices[:, None], vertices[None, :])
-    return Schedule(scheduled, polytope, vertices, float(np.linalg.eigvals(pairs).real.max()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +58,8 @@ class TorqueDesign:
         law: vertex tables as shipped.
         feedback, observer: the points of the inequalities, SI, for the design inertia as shipped; verified exactly.
         inertia_scale: s, the design inertia over the nominal one.
-        gate: growth rates on the full grid.
+        growth_rates: worst on the full grid by case, 1/s: ``no_delay``, ``specified_delay``, and ``larger_inertia`` and
+            ``smaller_inertia`` by the spare factor, both with that delay.
         disturbance_gain: worst |theta / d| over the grid at the specified frequency, rad/(N m).
         torque_increment_nm: predicted rms torque increment per sample due to encoder quantisation.
         candidates_tried: how many loops were screened.
@@ -129,7 +70,7 @@ class TorqueDesign:
     feedback: FeedbackPoint
     observer: ObserverPoint
     inertia_scale: float
-    gate: GateResult
+    growth_rates: dict[str, float]
     disturbance_gain: float
     torque_increment_nm: float
     candidates_tried: int
@@ -153,7 +94,8 @@ class TorqueDesign:
             "predicted_torque_increment_nm": self.torque_increment_nm,
             "candidates_tried": self.candidates_tried,
             "inequalities_verified_exactly": True,
-            **self.gate.report(),
+            "worst_growth_rate_per_s": max(self.growth_rates[case] for case in ("no_delay", "specified_delay")),
+            "growth_rates_per_s": self.growth_rates,
         }
 
 
@@ -179,7 +121,7 @@ class _Search:
     feedback: FeedbackPoint
     observer: ObserverPoint
     inertia_unit: float
-    screen: PlantGrid
+    screen: ScheduledPlants
     tried: int = 0
 
     def points(self, feedback_disk: float, observer_disk: float, scale: float) -> tuple[FeedbackPoint, ObserverPoint]:
@@ -200,11 +142,10 @@ class _Search:
         )
 
     def is_stable(self, law: ScheduledLaw) -> bool:
-        """Whether the coarse grid is stable with delay and spare factor."""
+        """Whether the coarse grid is stable with the specified delay, with and without the spare factor."""
         self.tried += 1
-        spare = self.specification.margin_spare
-        loops = self.screen.loops(law, (1.0 / spare, 1.0, spare), self.specification.delay_s)
-        return all(loop.growth_rates().max() < 0.0 for _, loop in loops)
+        loops, spare = self.screen.loops(law), self.specification.margin_spare
+        return all(loops.is_stable(factor, self.specification.delay_s) for factor in (1.0 / spare, 1.0, spare))
 
     def widest(self, observer_disk: float, filter_time_s: float, scale: float) -> _Candidate | None:
         """The largest feedback disk of the grid that is stable, by bisection; None if the smallest is not."""
@@ -220,15 +161,22 @@ class _Search:
         law = self.law(disks[low], observer_disk, filter_time_s, scale)
         return _Candidate(disks[low], observer_disk, filter_time_s, scale, *self.performance(law, self.screen))
 
-    def performance(self, law: ScheduledLaw, grid: PlantGrid) -> tuple[float, float]:
+    def performance(self, law: ScheduledLaw, plants: ScheduledPlants) -> tuple[float, float]:
         """Worst disturbance gain, rad/(N m), and worst torque increment from encoder quantisation, N m, on a grid."""
-        loops = [loop for _, loop in grid.loops(law, (1.0,), 0.0)]
-        quantum = 2.0 * math.pi / 2**self.specification.encoder_bits
-        gain = max(
-            float(loop.disturbance_gains(self.specification.disturbance_frequency_rad_s).max()) for loop in loops
-        )
-        activity = max(float(loop.torque_activity().max()) for loop in loops)
-        return gain, activity * quantum / math.sqrt(12.0)
+        loops = plants.loops(law)
+        gain = loops.disturbance_gain(self.specification.disturbance_frequency_rad_s)
+        return gain, loops.torque_activity([self.specification.angle_noise_rad])
+
+    def growth_rates(self, law: ScheduledLaw, plants: ScheduledPlants) -> dict[str, float]:
+        """Worst growth rate by case, see `TorqueDesign`."""
+        loops, delay, spare = plants.loops(law), self.specification.delay_s, self.specification.margin_spare
+        cases = {
+            "no_delay": (1.0, 0.0),
+            "specified_delay": (1.0, delay),
+            "larger_inertia": (spare, delay),
+            "smaller_inertia": (1.0 / spare, delay),
+        }
+        return {name: loops.worst(*case).growth_rate_per_s for name, case in cases.items()}
 
     def candidates(self, progress: Progress) -> Iterator[_Candidate]:
         """Every stable combination with its largest feedback disk."""
@@ -264,7 +212,7 @@ def design_torque_law(robot: Robot, specification: Specification, progress: Prog
             _unit_feedback(chosen.inertia / unit, back_off, about),
             _unit_observer(chosen.inertia / unit, back_off, about),
             unit,
-            PlantGrid.over(robot, chosen.premises, SCREEN_CONFIGURATIONS, (0.0, 1.0)),
+            ScheduledPlants.of(robot, chosen.premises, PlantGrid.screen(robot)),
         )
         design = _best(search, progress, about)
         if holds_exactly(design.law, design.feedback, design.observer):
@@ -314,13 +262,13 @@ def _best(search: _Search, progress: Progress, about: str) -> TorqueDesign:
             f"{about}: encoder quantisation may cause torque increments of {bound:.3g} N m rms, "
             f"the quietest stable design has {least:.3g}"
         )
-    grid = PlantGrid.over(robot, search.schedule.premises, CONFIGURATIONS, PAYLOAD_FRACTIONS)
+    plants = ScheduledPlants.of(robot, search.schedule.premises, PlantGrid.full(robot))
     for candidate in quiet:
         at = candidate.feedback_disk, candidate.observer_disk
         law = search.law(*at, candidate.filter_time_constant_s, candidate.scale)
-        gate = grid_gate(law, grid, specification.delay_s, specification.margin_spare)
-        if gate.passed:
+        rates = search.growth_rates(law, plants)
+        if max(rates.values()) < 0.0:
             points = search.points(*at, candidate.scale)
-            performance = search.performance(law, grid)
-            return TorqueDesign(search.schedule, law, *points, candidate.scale, gate, *performance, search.tried)
-    raise InfeasibleError(f"{about}: every candidate of the coarse grid fails the gate on the full one")
+            performance = search.performance(law, plants)
+            return TorqueDesign(search.schedule, law, *points, candidate.scale, rates, *performance, search.tried)
+    raise InfeasibleError(f"{about}: every candidate of the coarse grid is unstable somewhere on the full one")

@@ -9,7 +9,7 @@ velocity filter, scale of the design inertia, observer bandwidth) are searched f
   both ways, and rms torque increments per sample from sensor noise within the specified fraction of the torque limits.
   The default law reads angles only; these laws read speeds too, so the noise of both counts.
 
-The loops are the frozen sampled ones of all joints together (`velocity_loop`), on a grid of configurations: no proof.
+The loops are the frozen sampled ones of all joints together (`quasilpv.loops`), on a grid of configurations: no proof.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.errors import InfeasibleError
+from quasilpv.loops.loop_grid import LoopGrid
+from quasilpv.loops.velocity_law import VelocityLaw
 from quasilpv.synthesis import acceleration_design
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.baselines import (
@@ -32,11 +34,9 @@ from quasilpv.synthesis.baselines import (
     pid_design,
     stretched_inertia,
 )
-from quasilpv.synthesis.grid_gate import CONFIGURATIONS, PAYLOAD_FRACTIONS
-from quasilpv.synthesis.inertia_range import configurations
+from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.synthesis.velocity_loop import VelocityFeedback, VelocityLoop
 from quasilpv.systems.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
@@ -47,9 +47,6 @@ VELOCITY_NOISE_RAD_S = 0.05
 SCALES_PER_CANDIDATE = 3
 SEARCH_BUDGET = SCALES_PER_CANDIDATE * acceleration_design.LARGEST_SEARCH
 """The default design tries three scales of the design inertia at every point of its search."""
-
-SCREEN_CONFIGURATIONS = 9
-SCREEN_PAYLOADS = (0.0, 1.0)
 
 # Coarse grids, in units of the sample rate (bandwidths), of the sample period (filter) and of the nominal inertia.
 Axes = Mapping[str, tuple[float, ...]]
@@ -85,22 +82,6 @@ FIRST_STEP = 0.2
 STEP_GROWTH = 1.5
 
 
-@dataclass(frozen=True, eq=False)
-class _Plants:
-    """True and nominal inertias over a grid of configurations and payload fractions, (B, n, n) each."""
-
-    nominal: FloatArray
-    true: FloatArray
-
-    @classmethod
-    def over(cls, robot: Robot, count: int, fractions: tuple[float, ...]) -> _Plants:
-        angles = configurations(robot, count)
-        nominal = np.array([robot.model.inertia(theta) for theta in angles])
-        plants = [robot.with_payload_fraction(fraction) for fraction in fractions]
-        true = np.array([plant.inertia(theta) for plant in plants for theta in angles])
-        return cls(np.tile(nominal, (len(fractions), 1, 1)), true)
-
-
 @dataclass(frozen=True)
 class _Candidate:
     """A point of the search and what the grid says of it."""
@@ -116,9 +97,9 @@ class _Search:
 
     robot: Robot
     specification: Specification
-    law: Callable[[Robot, Tuning, FloatArray, float], VelocityFeedback]
+    law: Callable[[Robot, Tuning, FloatArray, float], VelocityLaw]
     axes: Axes
-    plants: _Plants
+    plants: PlantGrid
     progress: Progress
     tried: int = 0
     improvements: list[tuple[dict[str, float], _Candidate]] = field(default_factory=list)
@@ -140,45 +121,36 @@ class _Search:
             payload_fraction=point.get("payload_fraction", 0.0),
         )
 
-    def growth_rate(self, tuning: Tuning, plants: _Plants, factor: float, delay_s: float) -> float:
-        """Worst over the plants, their inertia multiplied by a factor."""
-        law = self.law(self.robot, tuning, plants.nominal, self.specification.sample_period_s)
-        return float(VelocityLoop(law, factor * plants.true, delay_s).growth_rates().max())
+    def loops(self, tuning: Tuning, plants: PlantGrid) -> LoopGrid:
+        """The law of a point against the plants of a grid."""
+        return plants.loops(self.law(self.robot, tuning, plants.nominal, self.specification.sample_period_s))
 
-    def is_robust(self, tuning: Tuning, plants: _Plants) -> bool:
+    def is_robust(self, loops: LoopGrid) -> bool:
         """Whether all loops are stable: without delay, and with delay and spare factor."""
         spare, delay = self.specification.margin_spare, self.specification.delay_s
-        cases = ((1.0, 0.0), (spare, delay), (1.0 / spare, delay), (1.0, delay))
-        return all(self.growth_rate(tuning, plants, *case) < 0.0 for case in cases)
+        return all(loops.is_stable(*case) for case in ((1.0, 0.0), (spare, delay), (1.0 / spare, delay), (1.0, delay)))
 
-    def loop(self, tuning: Tuning, plants: _Plants) -> VelocityLoop:
-        """The loops without delay, for what is read off stable ones."""
-        return VelocityLoop(
-            self.law(self.robot, tuning, plants.nominal, self.specification.sample_period_s), plants.true
-        )
-
-    def disturbance_gain(self, tuning: Tuning, plants: _Plants) -> float:
+    def disturbance_gain(self, loops: LoopGrid, plants: PlantGrid) -> float:
         """Worst over the plants, s^2."""
-        frequency = self.specification.disturbance_frequency_rad_s
         unit = np.asarray(np.linalg.cholesky(plants.nominal), dtype=np.float64)
-        return float(self.loop(tuning, plants).disturbance_gains(frequency, unit).max())
+        return loops.disturbance_gain(self.specification.disturbance_frequency_rad_s, unit)
 
-    def torque_increment(self, tuning: Tuning, plants: _Plants) -> float:
+    def torque_increment(self, loops: LoopGrid) -> float:
         """Worst over the plants, N m."""
-        angle_noise = 2.0 * math.pi / 2**self.specification.encoder_bits / math.sqrt(12.0)
-        return float(self.loop(tuning, plants).torque_activity(angle_noise, VELOCITY_NOISE_RAD_S).max())
+        return loops.torque_activity([self.specification.angle_noise_rad, VELOCITY_NOISE_RAD_S])
 
     def visit(self, point: dict[str, float]) -> bool:
         """Evaluate one point; returns whether it is the best so far."""
         self.tried += 1
         self.progress(self.tried, SEARCH_BUDGET)
         tuning = self.tuning(point)
-        gain = self.disturbance_gain(tuning, self.plants)
+        loops = self.loops(tuning, self.plants)
+        gain = self.disturbance_gain(loops, self.plants)
         if self.improvements and gain >= self.improvements[-1][1].disturbance_gain:
             return False
-        if not self.is_robust(tuning, self.plants):
+        if not self.is_robust(loops):
             return False
-        activity = self.torque_increment(tuning, self.plants)
+        activity = self.torque_increment(loops)
         if activity > self.activity_bound_nm:
             return False
         self.improvements.append((point, _Candidate(tuning, gain, activity)))
@@ -203,23 +175,23 @@ class _Search:
             step *= STEP_GROWTH if self.visit(point) else STEP_GROWTH**-0.25
 
 
-def _pid_feedback(robot: Robot, tuning: Tuning, nominal: FloatArray, period: float) -> VelocityFeedback:
+def _pid_feedback(robot: Robot, tuning: Tuning, nominal: FloatArray, period: float) -> VelocityLaw:
     largest = stretched_inertia(robot, tuning.payload_fraction)
     per_joint = np.broadcast_to(np.diag(tuning.inertia_scale * largest), nominal.shape)
     kp, kd, ki = (gain * per_joint for gain in tuning.unit_gains())
-    return VelocityFeedback(period, kp, kd, ki, nominal, tuning.velocity_filter_time_constant_s)
+    return VelocityLaw(period, kp, kd, ki, nominal, tuning.velocity_filter_time_constant_s)
 
 
-def _computed_torque_feedback(robot: Robot, tuning: Tuning, nominal: FloatArray, period: float) -> VelocityFeedback:
+def _computed_torque_feedback(robot: Robot, tuning: Tuning, nominal: FloatArray, period: float) -> VelocityLaw:
     inertia = tuning.inertia_scale * nominal
     kp, kd, ki = (gain * inertia for gain in tuning.unit_gains())
     filter_time, observer = tuning.velocity_filter_time_constant_s, tuning.observer_bandwidth_rad_s
-    return VelocityFeedback(period, kp, kd, ki, inertia, filter_time, observer)
+    return VelocityLaw(period, kp, kd, ki, inertia, filter_time, observer)
 
 
 def pid_tuned(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
     """PID with feedforward, tuned. InfeasibleError: no point of the search meets the specification."""
-    search = _Search(robot, specification, _pid_feedback, PID, _screen(robot), progress)
+    search = _Search(robot, specification, _pid_feedback, PID, PlantGrid.screen(robot), progress)
     return _designed("pid-tuned", search, pid_design)
 
 
@@ -227,7 +199,9 @@ def computed_torque_tuned(
     robot: Robot, specification: Specification, progress: Progress = no_progress
 ) -> TrackingDesign:
     """Computed torque, tuned. InfeasibleError: no point of the search meets the specification."""
-    search = _Search(robot, specification, _computed_torque_feedback, COMPUTED_TORQUE, _screen(robot), progress)
+    search = _Search(
+        robot, specification, _computed_torque_feedback, COMPUTED_TORQUE, PlantGrid.screen(robot), progress
+    )
     return _designed("ctc-tuned", search, computed_torque_design)
 
 
@@ -235,12 +209,8 @@ def computed_torque_with_observer_tuned(
     robot: Robot, specification: Specification, progress: Progress = no_progress
 ) -> TrackingDesign:
     """Computed torque with observer, tuned. InfeasibleError: no point of the search meets the specification."""
-    search = _Search(robot, specification, _computed_torque_feedback, WITH_OBSERVER, _screen(robot), progress)
+    search = _Search(robot, specification, _computed_torque_feedback, WITH_OBSERVER, PlantGrid.screen(robot), progress)
     return _designed("ctc-dob-tuned", search, computed_torque_design)
-
-
-def _screen(robot: Robot) -> _Plants:
-    return _Plants.over(robot, SCREEN_CONFIGURATIONS, SCREEN_PAYLOADS)
 
 
 def _designed(
@@ -250,29 +220,29 @@ def _designed(
     search.run()
     robot, specification = search.robot, search.specification
     about = f"{robot.id}: no {controller} design at {specification.rate_hz:g} Hz"
-    grid = _Plants.over(robot, CONFIGURATIONS, PAYLOAD_FRACTIONS)
+    plants = PlantGrid.full(robot)
     for _, candidate in reversed(search.improvements):
         tuning = candidate.tuning
-        if not search.is_robust(tuning, grid):
+        loops = search.loops(tuning, plants)
+        if not search.is_robust(loops):
             continue
-        gain, activity = search.disturbance_gain(tuning, grid), search.torque_increment(tuning, grid)
+        gain, activity = search.disturbance_gain(loops, plants), search.torque_increment(loops)
         if activity <= search.activity_bound_nm:
             return replace(
                 build(robot, specification, tuning),
                 controller=controller,
                 inputs={"controller": controller, "specification": specification.to_document()},
-                report=_report(search, _Candidate(tuning, gain, activity), grid),
+                report=_report(search, _Candidate(tuning, gain, activity), loops),
             )
     raise InfeasibleError(f"{about}: no point of the search is stable with every payload within the torque activity")
 
 
-def _report(search: _Search, chosen: _Candidate, grid: _Plants) -> dict[str, Any]:
+def _report(search: _Search, chosen: _Candidate, loops: LoopGrid) -> dict[str, Any]:
     """The numbers a person asks for, JSON-able."""
     delays = {"no_delay": 0.0, "specified_delay": search.specification.delay_s}
-    rates = {name: search.growth_rate(chosen.tuning, grid, 1.0, delay) for name, delay in delays.items()}
+    rates = {name: loops.worst(delay_s=delay).growth_rate_per_s for name, delay in delays.items()}
     return {
         **asdict(chosen.tuning),
-        "proved": False,
         "worst_growth_rate_per_s": max(rates.values()),
         "growth_rates_per_s": rates,
         "disturbance_gain_s2": chosen.disturbance_gain,

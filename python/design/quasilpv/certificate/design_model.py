@@ -1,0 +1,95 @@
+"""Exact check that a law is scheduled over its whole operating domain, with the inertia of its own robot.
+
+The inequalities of a law are about the box and the inertia of its tables. Two claims tie these to the robot:
+
+* **premise box**: every premise is the cosine of a sum of joint angles; its range over the operating domain, enclosed
+  in ball arithmetic, lies in the box the run-time side clamps it to.
+* **inertia table**: for every premise vector of the box, the table is s times the inertia of the links in the artifact,
+  s > 0 one number, entry by entry within `ROUNDING` of its diagonal; a cosine that is not scheduled is held at a value
+  it takes on the operating domain.
+
+In absolute angles the inertia is ``D_kl cos(alpha_k - alpha_l)`` (`gate_inertia`), so both sides are affine in the same
+cosines and are compared coefficient by coefficient, in rational arithmetic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import product
+from typing import Any
+
+from flint import fmpq, fmpq_mat
+
+from quasilpv.certificate.claims import Claim
+from quasilpv.certificate.exact_matrices import magnitude, rational, zero
+from quasilpv.certificate.gate_data import arm_inertia_data
+from quasilpv.certificate.gate_inertia import ArmInertiaData, Pair, design_inertia, true_inertia
+from quasilpv.certificate.gate_range import cosine_range
+from quasilpv.certificate.gate_rationals import to_float
+
+ROUNDING = fmpq(1, 1 << 40)
+"""Largest deviation of an entry, relative to the geometric mean of its diagonal entries: about 9e-13."""
+
+
+def check_design_model(document: Mapping[str, Any]) -> tuple[Claim, ...]:
+    """Claims of an artifact of a planar serial arm, given as its document.
+
+    Raises:
+        InputError: another robot, or a premise that is not the cosine of a sum of neighbouring joint angles.
+        KeyError, TypeError, ValueError: the document is not of the documented form.
+    """
+    data = arm_inertia_data(document)
+    return (*_coverage_claims(data), *_inertia_claims(data))
+
+
+def _coverage_claims(data: ArmInertiaData) -> Iterator[Claim]:
+    for p, pair in enumerate(data.premise_pairs):
+        below, above = cosine_range(data, pair)
+        lower, upper = rational(data.premise_lower[p]), rational(data.premise_upper[p])
+        beyond = max(lower - below, above - upper)
+        margin = 1.0 if beyond <= 0 else max(-1.0, -to_float(beyond / (upper - lower)))
+        yield Claim(f"premise box: {_cosine(pair)} on the operating domain", beyond <= 0, margin)
+
+
+def _inertia_claims(data: ArmInertiaData) -> Iterator[Claim]:
+    """The value of each cosine that is not scheduled, and proportionality of everything else."""
+    n, table, nominal = data.joints, design_inertia(data), true_inertia(data)
+    robot = fmpq_mat(n, n, [nominal[i][j](fmpq(0)) for i, j in product(range(n), repeat=2)])
+    scale = table.constant[n - 1, n - 1] / robot[n - 1, n - 1]
+    if scale <= 0:
+        yield Claim("inertia table: a positive multiple of the robot's own", False, -1.0)
+        return
+    constant = table.constant - scale * sum((_only(robot, (k, k)) for k in range(n)), zero(n, n))
+    for pair in (pair for pair in data.pairs if pair not in table.slopes):
+        below, above = cosine_range(data, pair)
+        held = table.constant[pair] / (scale * robot[pair])
+        inside = min(held - below, above - held) / (above - below)
+        title = f"inertia table: {_cosine(pair)} held at {to_float(held):.4g}, a value it takes"
+        yield Claim(title, inside >= 0, max(-1.0, to_float(inside)))
+        constant -= _only(table.constant, pair)
+    error = table.rest + magnitude(constant)
+    for pair, slope in table.slopes.items():
+        error += magnitude(slope - scale * _only(robot, pair))
+    yield _proportional(scale, error, robot)
+
+
+def _proportional(scale: fmpq, error: fmpq_mat, robot: fmpq_mat) -> Claim:
+    """The claim that every entry of the error is small against ``scale * sqrt(D_ii D_jj)``."""
+    entries = product(range(robot.nrows()), repeat=2)
+    squares = [error[i, j] ** 2 / (robot[i, i] * robot[j, j]) for i, j in entries]
+    worst = max(squares) / (scale * ROUNDING) ** 2
+    margin = 1.0 - to_float(min(worst, fmpq(4))) ** 0.5
+    return Claim(f"inertia table: {to_float(scale):.6g} times the robot's own", worst <= 1, margin)
+
+
+def _only(square: fmpq_mat, pair: Pair) -> fmpq_mat:
+    """The two entries of a pair, the rest zero."""
+    i, j = pair
+    chosen = zero(square.nrows(), square.nrows())
+    chosen[i, j], chosen[j, i] = square[i, j], square[j, i]
+    return chosen
+
+
+def _cosine(pair: Pair) -> str:
+    i, j = pair
+    return f"cos({' + '.join(f'theta_{k}' for k in range(i + 2, j + 2))})"

@@ -1,0 +1,165 @@
+"""The robust gate of torque-level laws: growth rates of the frozen sampled loop on a grid, from the artifact alone.
+
+An LMI certificate covers the design model in continuous time; it says nothing about a plant of another inertia, about
+sampling, or about delay. With matrix gains the loop of n joints does not decouple into scalar ones, so there is no
+proof like that of the acceleration-level law (`quasilpv.certificate.gate`): the map from one sample to the next is
+rebuilt from the shipped tables at every configuration and payload of a grid, and its spectral radius computed. A grid
+check is no proof, and is reported as none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from flint import fmpq
+
+from quasilpv.certificate.gate_data import HALF_A_SAMPLE, arm_inertia_data, law_kind
+from quasilpv.certificate.gate_inertia import ArmInertiaData
+from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_range
+from quasilpv.certificate.gate_rationals import to_float
+from quasilpv.certificate.vertex_tables import VertexTable
+from quasilpv.loops.frozen_loop import FloatArray, FrozenLaw
+from quasilpv.loops.loop_grid import PAYLOAD_FRACTIONS, LoopGrid, WorstLoop, configurations
+from quasilpv.loops.torque_law import TorqueLaw
+
+CURVE_FACTORS = 25
+CURVE_REACH = 1.3
+
+FrozenLawBuilder = Callable[[Mapping[str, Any], FloatArray], FrozenLaw]
+
+
+@dataclass(frozen=True)
+class GridGate:
+    """What the gate found. Nothing but the needed range is proved.
+
+    Attributes:
+        plants: the law against every plant of the grid.
+        specified_delay_s: the transport delay the design has to tolerate.
+        worst: by case ``no_delay`` and ``specified_delay``.
+        margin: the interval of ``M_t / M_n`` around 1 on which the loops with plants ``M_t = rho M_n``, one factor rho
+            for all joints, are stable with the specified delay; None if they are not at 1.
+        factors: the interval around 1 by which all true inertias of the grid may be multiplied at the specified delay;
+            None if a loop is unstable as it is.
+        delay_margin_s: the delay up to which all loops are stable; None if one is unstable without delay.
+        needed: which ratios ``M_t / M_n`` occur, proved; None if no bounds could be proved.
+    """
+
+    plants: LoopGrid
+    specified_delay_s: float
+    worst: Mapping[str, WorstLoop]
+    margin: tuple[float, float] | None
+    factors: tuple[float, float] | None
+    delay_margin_s: float | None
+    needed: NeededRange | None
+
+    @property
+    def passed(self) -> bool:
+        """Whether every loop of the grid is stable at all delays tried up to the specified one, that one included."""
+        stable = all(worst.growth_rate_per_s < 0.0 for worst in self.worst.values())
+        return stable and self.delay_margin_s is not None and self.delay_margin_s >= self.specified_delay_s
+
+    @property
+    def worst_case(self) -> tuple[WorstLoop, float]:
+        """The largest growth rate over both cases, and the delay it occurs at, s."""
+        case = max(self.worst, key=lambda name: self.worst[name].growth_rate_per_s)
+        return self.worst[case], 0.0 if case == "no_delay" else self.specified_delay_s
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON-able: what ``design robust --json`` prints. null stands for no value; `proved` is never true."""
+        worst, delay_s = self.worst_case
+        return {
+            "passed": self.passed,
+            "proved": False,
+            "inertia_margin": None if self.margin is None else list(self.margin),
+            "delay_margin_s": self.delay_margin_s,
+            "needed_range": None if self.needed is None else list(self.needed.to_floats()),
+            "worst_growth_rate_per_s": worst.growth_rate_per_s,
+            "where": {
+                "angle_rad": list(worst.angle_rad),
+                "payload_fraction": worst.payload_fraction,
+                "delay_s": delay_s,
+            },
+            "growth_rates_per_s": {case: found.growth_rate_per_s for case, found in self.worst.items()},
+            "inertia_factors": None if self.factors is None else list(self.factors),
+            "grid": {"configurations": len(self.plants.angles), "payload_fractions": list(self.plants.inertia)},
+        }
+
+
+def grid_gate(document: Mapping[str, Any], source: str = "artifact", delay_samples: fmpq = HALF_A_SAMPLE) -> GridGate:
+    """Put an artifact to the gate.
+
+    Args:
+        document: the artifact as a JSON tree.
+        source: what to call it in errors.
+        delay_samples: the transport delay it has to tolerate, in samples.
+
+    Raises:
+        InputError: a law this gate does not know, another robot than a planar serial arm, a premise that leaves its box
+            on the operating domain, or data that contradict each other.
+    """
+    build = FROZEN_LAWS[law_kind(document, source, FROZEN_LAWS)]
+    data = arm_inertia_data(document, source)
+    pair = InertiaPair(data)
+    angles = configurations(data.angle_rad)
+    plants = LoopGrid(build(document, angles), angles, {f: pair.true_inertia_at(angles, f) for f in PAYLOAD_FRACTIONS})
+    delay_s = to_float(delay_samples) * plants.law.sample_period_s
+    return GridGate(
+        plants=plants,
+        specified_delay_s=delay_s,
+        worst={"no_delay": plants.worst(), "specified_delay": plants.worst(delay_s=delay_s)},
+        margin=replace(plants, inertia={0.0: pair.design_inertia_at(angles)}).factor_range(delay_s),
+        factors=plants.factor_range(delay_s),
+        delay_margin_s=plants.delay_margin_s(delay_s),
+        needed=needed_range(pair),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class GrowthCurve:
+    """Worst growth rate over the grid against a common factor on all true inertias.
+
+    Attributes:
+        delay_s: transport delay.
+        factors: (N,).
+        rates_per_s: (N,).
+    """
+
+    delay_s: float
+    factors: FloatArray
+    rates_per_s: FloatArray
+
+
+def growth_curves(gate: GridGate, points: int = CURVE_FACTORS) -> tuple[GrowthCurve, ...]:
+    """The worst growth rate at no delay, at the specified one and at twice that, a little beyond the stable factors."""
+    low, high = gate.factors or (0.5, 2.0)
+    factors = np.geomspace(low / CURVE_REACH, high * CURVE_REACH, points)
+    return tuple(
+        GrowthCurve(delay, factors, np.array([gate.plants.worst(f, delay).growth_rate_per_s for f in factors.tolist()]))
+        for delay in (0.0, gate.specified_delay_s, 2.0 * gate.specified_delay_s)
+    )
+
+
+def frozen_torque_law(document: Mapping[str, Any], angles: FloatArray) -> TorqueLaw:
+    """The law `dob-torque` of an artifact at B configurations, (B, n), its premises clamped to their box."""
+    law = document["law"]
+    tables = {name: VertexTable.parse(law[name]) for name in ("inertia", "feedback", "observer")}
+    cosines = _premises_at(arm_inertia_data(document), angles)
+    return TorqueLaw(
+        sample_period_s=float(document["sample_period_s"]),
+        filter_time_constant_s=float(law["filter_time_constant_s"]),
+        **{name: table.evaluate(cosines) for name, table in tables.items()},
+    )
+
+
+def _premises_at(data: ArmInertiaData, angles: FloatArray) -> FloatArray:
+    """The cosines the premises are, (B, p)."""
+    absolute = np.cumsum(angles, axis=1)
+    columns = [np.cos(absolute[:, upper] - absolute[:, lower]) for lower, upper in data.premise_pairs]
+    return np.array(columns).reshape(len(columns), len(angles)).T
+
+
+FROZEN_LAWS: Mapping[str, FrozenLawBuilder] = {"dob-torque": frozen_torque_law}
+"""How each law kind without a proof is frozen; a new one is one function here."""

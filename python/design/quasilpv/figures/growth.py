@@ -1,0 +1,50 @@
+"""The grid gate in one picture: how fast the worst loop of the grid decays or grows as the true inertia is scaled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+from quasilpv.certificate.grid_gate import GridGate, GrowthCurve
+from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, new_figure, style
+
+_COLOURS = (GREEN, BLUE, VERMILION)
+_TICKS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0)
+
+
+def growth_figure(gate: GridGate, curves: Sequence[GrowthCurve]) -> Figure:
+    """Worst growth rate against a common factor on all true inertias, one curve per transport delay.
+
+    The gate passes if the curves of no delay and of the specified delay are below zero at factor 1. The shaded factors
+    are those at which the loop with the specified delay is stable.
+
+    Args:
+        gate: what it found.
+        curves: of `growth_curves`, the shortest delay first.
+    """
+    with style():
+        period = gate.plants.law.sample_period_s
+        figure = new_figure(
+            3.8, f"Worst growth rate of the frozen loop over the grid at {1.0 / period:g} Hz (no proof)"
+        )
+        axes = figure.subplots()
+        if gate.factors is not None:
+            axes.axvspan(*gate.factors, color=ORANGE, alpha=0.2, linewidth=0, label="stable at the specified delay")
+        for curve, colour in zip(curves, _COLOURS, strict=True):
+            label = f"delay {curve.delay_s * 1e3:g} ms = {curve.delay_s / period:g} T"
+            axes.plot(curve.factors, curve.rates_per_s, color=colour, marker=".", markersize=3, label=label)
+        axes.axhline(0.0, color=BLACK, linewidth=0.8)
+        axes.axvline(1.0, color=BLACK, linewidth=0.8, linestyle=(0, (4, 2)))
+        decay = -min(float(curve.rates_per_s.min()) for curve in curves)
+        axes.set_ylim(-1.3 * decay, 3.0 * decay)
+        axes.set_xscale("log")
+        axes.set_xlim(curves[0].factors[0], curves[0].factors[-1])
+        axes.xaxis.set_major_locator(FixedLocator(_TICKS))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.set_xlabel("factor on the true inertia of every configuration and payload")
+        axes.set_ylabel("worst growth rate (1/s)")
+        figure.legend(loc="outside lower center", ncols=2, handlelength=2.2)
+        return figure

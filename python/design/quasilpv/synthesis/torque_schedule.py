@@ -1,0 +1,116 @@
+"""What `dob-torque` is scheduled with, and the law as vertex tables on that schedule."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import sympy as sp
+
+from quasilpv.errors import InfeasibleError
+from quasilpv.loops.loop_grid import LoopGrid
+from quasilpv.loops.torque_law import TorqueLaw
+from quasilpv.polytopes import BlockPolytope
+from quasilpv.synthesis.plant_grid import PlantGrid
+from quasilpv.systems.premise import Premise
+from quasilpv.systems.registry import Robot
+
+FloatArray = npt.NDArray[np.float64]
+
+LARGEST_SPREAD = 3.0
+"""Premises are scheduled as long as eig(M_i^-1 M_j) stays below this over all pairs of vertices. One observer matrix Q
+in torque coordinates must serve all of them: already for a single joint the squared L2 gain grows tenfold per unit of
+this ratio, and between 5 and 6 there is no Q at all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """The measured premises the gains depend on, and the design inertia on their box.
+
+    Attributes:
+        premises: those scheduled; the others sit at the middle of their interval, and what they change is disturbance.
+        polytope: Takagi-Sugeno representation of their box: for up to two premises no other has tighter vertices.
+        inertia: vertices of the nominal inertia, (N, n, n), kg m^2.
+        spread: largest eigenvalue of M_i^-1 M_j over the vertices.
+    """
+
+    premises: tuple[Premise, ...]
+    polytope: BlockPolytope
+    inertia: FloatArray
+    spread: float
+
+
+def schedule(robot: Robot) -> Schedule:
+    """As many inertia premises as keep the spread below `LARGEST_SPREAD`; among equals the smallest spread.
+
+    Raises:
+        InfeasibleError: not even the empty set leaves a positive definite inertia.
+    """
+    count = len(robot.model.inertia_premises(robot.domain))
+    for size in range(count, -1, -1):
+        candidates = [_schedule_of(robot, chosen) for chosen in itertools.combinations(range(count), size)]
+        best = min(candidates, key=lambda candidate: candidate.spread)
+        if best.spread < LARGEST_SPREAD:
+            return best
+    raise InfeasibleError(f"{robot.id}: no dob-torque design: the inertia at the middle of the box is not definite")
+
+
+def _schedule_of(robot: Robot, chosen: tuple[int, ...]) -> Schedule:
+    premises, affine = robot.model.inertia_premises(robot.domain), robot.model.inertia_affine()
+    middle = np.array([(p.lower + p.upper) / 2.0 for p in premises])
+    middle[list(chosen)] = 0.0
+    scheduled = tuple(premises[k] for k in chosen)
+    polytope = BlockPolytope.takagi_sugeno([p.lower for p in scheduled], [p.upper for p in scheduled])
+    vertices = polytope.vertices(affine.evaluate(middle), affine.coefficients[list(chosen)])
+    vertices = (vertices + vertices.swapaxes(1, 2)) / 2.0
+    if np.linalg.eigvalsh(vertices).min() <= 0.0:
+        return Schedule(scheduled, polytope, vertices, math.inf)
+    pairs = np.linalg.solve(vertices[:, None], vertices[None, :])
+    return Schedule(scheduled, polytope, vertices, float(np.linalg.eigvals(pairs).real.max()))
+
+
+@dataclass(frozen=True, eq=False)
+class ScheduledLaw:
+    """The law `dob-torque` as vertex tables on one polytope.
+
+    Attributes:
+        polytope: of the scheduled premises.
+        inertia, feedback, observer: vertices, (N, n, n), (N, n, 3n), (N, 4n, n), SI.
+        sample_period_s: T.
+        filter_time_constant_s: T_f.
+    """
+
+    polytope: BlockPolytope
+    inertia: FloatArray
+    feedback: FloatArray
+    observer: FloatArray
+    sample_period_s: float
+    filter_time_constant_s: float
+
+    def at(self, premises: FloatArray) -> TorqueLaw:
+        """The law frozen at B premise vectors, (B, p), clamped to the box as the run-time side does."""
+        weights = self.polytope.weights(self.polytope.saturate(premises)[0])
+        tables = (np.tensordot(weights, table, axes=1) for table in (self.inertia, self.feedback, self.observer))
+        return TorqueLaw(self.sample_period_s, self.filter_time_constant_s, *tables)
+
+
+@dataclass(frozen=True, eq=False)
+class ScheduledPlants:
+    """A grid of plants and the scheduled premises at its configurations, (B, p)."""
+
+    plants: PlantGrid
+    premises: FloatArray
+
+    @classmethod
+    def of(cls, robot: Robot, premises: tuple[Premise, ...], plants: PlantGrid) -> ScheduledPlants:
+        """Evaluate the premises of a robot on a grid."""
+        evaluate = sp.lambdify(robot.model.symbolic.theta, [premise.expression for premise in premises])
+        values = np.array([evaluate(*theta) for theta in plants.angles], dtype=float)
+        return cls(plants, values.reshape(len(plants.angles), len(premises)))
+
+    def loops(self, law: ScheduledLaw) -> LoopGrid:
+        """A law against all plants."""
+        return self.plants.loops(law.at(self.premises))
