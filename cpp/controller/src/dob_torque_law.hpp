@@ -1,9 +1,7 @@
 // Gain-scheduled tracking with a disturbance observer in torque coordinates: the law of Theorem IV.11.
 #pragma once
 
-#include <cmath>
-
-#include "observer_state.hpp"
+#include "observer_law.hpp"
 
 namespace quasilpv {
 
@@ -19,110 +17,59 @@ namespace quasilpv {
 ///     th    += T w + T^2/2 a + T^3/6 j;  w += T a + T^2/2 j;  d += T dd     exact zero-order hold
 ///
 /// The correction solves x = x_hat + T L (y - C x) for the x after it: unlike x_hat += T L (y - th) it stays stable
-/// when T times the observer's bandwidth is not small. Starts at x_hat = (y, 0, 0, 0), d_f = e_I = 0. Without a valid
-/// measurement the innovation is zero, the prediction stands in for y, and e_I is frozen. Coriolis torque is part of
-/// the disturbance. Source: Dehak 2022, Theorem IV.11, in the reduced form with a constant observer matrix.
+/// when T times the observer's bandwidth is not small. Start and samples without a measurement: see ObserverLaw.
+/// Coriolis torque is part of the disturbance. Source: Dehak 2022, Theorem IV.11, in the reduced form with a constant
+/// observer matrix.
 template <int N>
-class DobTorqueLaw final : public ControlLaw {
+class DobTorqueLaw final : public ObserverLaw<N> {
  public:
   DobTorqueLaw(const DobTorqueParameters& parameters, const LawSettings& settings)
-      : parameters_(parameters),
-        sample_period_s_(settings.sample_period_s),
-        filter_pole_(std::exp(-settings.sample_period_s / parameters.filter_time_constant_s)),
-        limiter_(settings.limits, settings.sample_period_s, N) {}
-
-  StepReport step(const StepInput& input) noexcept override {
-    StepReport report;
-    report.seq = input.seq;
-    const JointVector<N> measured = from_array<N>(input.angle);
-    const bool valid = input.valid && measured.allFinite();
-    report.flags = valid ? kStepHealthy : kMeasurementInvalid;
-    if (!started_) {
-      if (!valid) {
-        report.torque_applied = limiter_.last_applied();
-        return report;
-      }
-      start(measured);
-    }
-    const ReferenceVectors<N> reference = reference_.accept(input.reference, report);
-    const JointVector<N> y = valid ? measured : state_.angle;
-    const ModelSample<N> model = sample_model<N>(parameters_.model, y, report);
-    if (valid) {
-      correct(measured, report);
-    }
-    state_.filter(filter_pole_);
-    state_.write_to(report);
-
-    FeedbackGain feedback;
-    parameters_.feedback.evaluate(report.premise.data(), feedback);
-    to_array<N>(commanded_torque(model, feedback, reference), report.torque_commanded);
-    report.flags |= limiter_.apply(report.torque_commanded, report.torque_applied);
-    if (valid) {
-      const JointVector<N> integral_gain = feedback.template rightCols<N>().diagonal();
-      integrate_error<N>(y - reference.angle, integral_gain, report, sample_period_s_, state_.integral_error);
-    }
-    predict(model, reference, report);
-    return report;
-  }
-
-  void reset() noexcept override {
-    started_ = false;
-    limiter_.reset();
-  }
+      : ObserverLaw<N>(parameters.model, settings, parameters.filter_time_constant_s),
+        feedback_(parameters.feedback),
+        observer_(parameters.observer),
+        sample_period_s_(settings.sample_period_s) {}
 
  private:
-  using FeedbackGain = Eigen::Matrix<double, N, 3 * N>;
-  using ObserverGain = Eigen::Matrix<double, 4 * N, N>;
+  using typename ObserverLaw<N>::Motion;
 
-  void start(const JointVector<N>& measured) noexcept {
-    state_ = ObserverState<N>::at_rest(measured);
-    reference_.reset(measured);
-    started_ = true;
-  }
-
-  void correct(const JointVector<N>& measured, StepReport& report) noexcept {
-    ObserverGain gain;
-    parameters_.observer.evaluate(report.premise.data(), gain);
+  void correct(const JointVector<N>& measured, StepReport& report, ObserverState<N>& state) noexcept override {
+    Eigen::Matrix<double, 4 * N, N> gain;
+    observer_.evaluate(report.premise.data(), gain);
     gain *= sample_period_s_;
     const JointMatrix<N> implicit = JointMatrix<N>::Identity() + gain.template topRows<N>();
-    const JointVector<N> innovation = solve_general<N>(implicit, measured - state_.angle);
+    const JointVector<N> innovation = solve_general<N>(implicit, measured - state.angle);
     const Eigen::Matrix<double, 4 * N, 1> correction = gain * innovation;
-    state_.angle += correction.template segment<N>(0);
-    state_.speed += correction.template segment<N>(N);
-    state_.disturbance += correction.template segment<N>(2 * N);
-    state_.disturbance_rate += correction.template segment<N>(3 * N);
+    state.angle += correction.template segment<N>(0);
+    state.speed += correction.template segment<N>(N);
+    state.disturbance += correction.template segment<N>(2 * N);
+    state.disturbance_rate += correction.template segment<N>(3 * N);
   }
 
-  JointVector<N> commanded_torque(const ModelSample<N>& model, const FeedbackGain& feedback,
-                                  const ReferenceVectors<N>& reference) const noexcept {
-    Eigen::Matrix<double, 3 * N, 1> error;
-    error << state_.angle - reference.angle, state_.speed - reference.speed, state_.integral_error;
-    return model.inertia * reference.acceleration - state_.filtered_disturbance + feedback * error + model.gravity;
+  Command<N> control(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& reference,
+                     StepReport& report) noexcept override {
+    TrackingGain<N> gain;
+    feedback_.evaluate(report.premise.data(), gain);
+    TrackingError<N> error;
+    error << state.angle - reference.angle, state.speed - reference.speed, state.integral_error;
+    return {model.inertia * reference.acceleration - state.filtered_disturbance + gain * error + model.gravity,
+            gain.template rightCols<N>().diagonal()};
   }
 
-  // With the torque that acts on the plant, so that limits do not disturb the observer. If the model has no finite
-  // answer (gravity not finite, inertia not positive definite), the reference acceleration is predicted. A state that
-  // overflowed all the same is dropped: the observer starts again at the next valid measurement.
-  void predict(const ModelSample<N>& model, const ReferenceVectors<N>& reference, StepReport& report) noexcept {
-    const JointVector<N> torque = from_array<N>(report.torque_applied) - model.gravity + state_.disturbance;
-    JointVector<N> acceleration = model.acceleration(torque);
-    JointVector<N> jerk = model.acceleration(state_.disturbance_rate);
-    if (!acceleration.allFinite() || !jerk.allFinite()) {
-      acceleration = reference.acceleration;
-      jerk.setZero();
+  // If the model has no finite answer, the reference acceleration is predicted.
+  Motion predict(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& reference,
+                 StepReport& report) noexcept override {
+    const JointVector<N> torque = from_array<N>(report.torque_applied) - model.gravity + state.disturbance;
+    Motion motion{model.acceleration(torque), model.acceleration(state.disturbance_rate)};
+    if (!motion.acceleration.allFinite() || !motion.jerk.allFinite()) {
+      motion = {reference.acceleration, JointVector<N>::Zero()};
       report.flags |= kModelInvalid;
     }
-    state_.advance(sample_period_s_, acceleration, jerk);
-    started_ = state_.is_finite();
+    return motion;
   }
 
-  DobTorqueParameters parameters_;
+  BlockPolytope feedback_;
+  BlockPolytope observer_;
   double sample_period_s_;
-  double filter_pole_;
-  Limiter limiter_;
-  ReferenceGuard<N> reference_;
-  ObserverState<N> state_;
-  bool started_ = false;
 };
 
 }  // namespace quasilpv

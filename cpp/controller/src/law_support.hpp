@@ -121,6 +121,20 @@ class MeasurementFilter {
   JointVector<N> speed_ = JointVector<N>::Zero();
 };
 
+/// xi = (e, e', int e) and the gain [Kp Kd KI] that acts on it.
+template <int N>
+using TrackingError = Eigen::Matrix<double, 3 * N, 1>;
+template <int N>
+using TrackingGain = Eigen::Matrix<double, N, 3 * N>;
+
+/// What a law wants of one sample: the torque before limits, N m, and the gains of its integrals, whose signs say which
+/// way each integral pushes (see integrate_error()).
+template <int N>
+struct Command {
+  JointVector<N> torque;
+  JointVector<N> integral_gain;
+};
+
 /// Forward Euler of the integral of the error, e_I += T e. Anti-windup by clamping: joint j is frozen while its torque
 /// is limited and gain_j e_j pushes further in the direction that the limits cut off, or while the torque is not
 /// finite.

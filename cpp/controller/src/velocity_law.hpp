@@ -1,0 +1,79 @@
+// What the laws that read measured angles and speeds share: one sample, around the feedback that tells them apart.
+#pragma once
+
+#include "law_support.hpp"
+
+namespace quasilpv {
+
+/// One sample of a law with feedback from angles, speeds and the integral of the error, e = r - y. Without a valid
+/// measurement the last one is held and the integral is frozen; anti-windup: see integrate_error().
+template <int N>
+class VelocityLaw : public ControlLaw {
+ public:
+  StepReport step(const StepInput& input) noexcept final {
+    StepReport report;
+    report.seq = input.seq;
+    const bool starting = !measurement_.started();
+    const bool valid = measurement_.accept(input, report);
+    if (!measurement_.started()) {
+      report.torque_applied = limiter_.last_applied();
+      return report;
+    }
+    if (starting) {
+      reference_.reset(measurement_.angle());
+      integral_.setZero();
+      start(measurement_.speed());
+    }
+    const ReferenceVectors<N> reference = reference_.accept(input.reference, report);
+    const Sample sample{reference, measurement_.angle(), measurement_.speed(), integral_};
+    to_array<N>(sample.angle, report.estimated_angle);
+    to_array<N>(sample.speed, report.estimated_speed);
+    to_array<N>(sample.integral, report.integral_error);
+    const ModelSample<N> model = sample_model<N>(model_, sample.angle, report);
+    const Command<N> command = control(sample, model, report);
+    to_array<N>(command.torque, report.torque_commanded);
+    report.flags |= limiter_.apply(report.torque_commanded, report.torque_applied);
+    if (valid) {
+      integrate_error<N>(reference.angle - sample.angle, command.integral_gain, report, sample_period_s_, integral_);
+    }
+    applied(sample, model, report);
+    return report;
+  }
+
+  void reset() noexcept final {
+    measurement_.reset();
+    limiter_.reset();
+  }
+
+ protected:
+  /// What one sample knows: reference, y, the filtered speed w, and the integral of r - y.
+  struct Sample {
+    ReferenceVectors<N> reference;
+    JointVector<N> angle;
+    JointVector<N> speed;
+    JointVector<N> integral;
+  };
+
+  VelocityLaw(const DesignModel& model, const LawSettings& settings, double velocity_filter_time_constant_s)
+      : model_(model),
+        sample_period_s_(settings.sample_period_s),
+        limiter_(settings.limits, settings.sample_period_s, N),
+        measurement_(settings.sample_period_s, velocity_filter_time_constant_s) {}
+
+ private:
+  /// The law starts with this speed.
+  virtual void start(const JointVector<N>& /*speed*/) noexcept {}
+  /// The torque of this sample, before limits.
+  virtual Command<N> control(const Sample& sample, const ModelSample<N>& model, StepReport& report) noexcept = 0;
+  /// The torque that acts is in the report.
+  virtual void applied(const Sample& /*sample*/, const ModelSample<N>& /*model*/, StepReport& /*report*/) noexcept {}
+
+  DesignModel model_;
+  double sample_period_s_;
+  Limiter limiter_;
+  MeasurementFilter<N> measurement_;
+  ReferenceGuard<N> reference_;
+  JointVector<N> integral_ = JointVector<N>::Zero();
+};
+
+}  // namespace quasilpv
