@@ -10,7 +10,8 @@ the time unit ``1/w`` of each chain (w: the bandwidth in the witness), with ``t 
 * observer ``l = (l1, l2 / w, l3 / w^2, l4 / w^3)'``, chain ``A = exp(N t)``, N the nilpotent shift; claims: with
   ``F = A (I - l C)``, ``[[r Q, Q (F - c I)], [*, r Q]] > 0``, ``[[Q, Q F], [*, Q - c3' c3]] > 0``, and
   ``objective > trace(H' Q H)`` with ``H = [A l, G]``: the variance of the disturbance estimate.
-* the table of the design inertia: what the run-time side collapses it to (`vertex_tables`).
+* the table of the design inertia: what the run-time side collapses it to (`vertex_tables`);
+* the operating envelope, if the witness has one (`sampled_envelope`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from flint import fmpq, fmpq_mat
 
 from quasilpv.certificate.claims import Claim
 from quasilpv.certificate.exact_matrices import identity, matrix, rational, symmetric, trace, zero
+from quasilpv.certificate.sampled_envelope import check_sampled_envelope
 from quasilpv.certificate.vertex_tables import VertexTable
 
 
@@ -37,6 +39,7 @@ def check_dob_acceleration(document: Mapping[str, Any]) -> tuple[Claim, ...]:
         *_feedback_claims(period, law["feedback"], witness["feedback"]),
         *_observer_claims(period, law["observer"], witness["observer"]),
         *VertexTable.parse(law["inertia"]).collapse_claim("inertia"),
+        *check_sampled_envelope(document),
     )
 
 

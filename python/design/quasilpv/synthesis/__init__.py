@@ -101,4 +101,6 @@ def synthesise(
     if "disturbance_compensation" not in design.law:
         raise InputError(controller, "disturbance_compensation", "off", "dob-acceleration, the law that has it")
     without = {"disturbance_compensation": False}
-    return replace(design, law={**design.law, **without}, inputs={**design.inputs, **without})
+    # The envelope is that of the compensated loop.
+    witness = {name: member for name, member in (design.witness or {}).items() if name != "envelope"}
+    return replace(design, law={**design.law, **without}, inputs={**design.inputs, **without}, witness=witness or None)

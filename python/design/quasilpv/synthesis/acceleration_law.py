@@ -6,6 +6,7 @@ from typing import Any
 
 from quasilpv.conditions.sampled_chains import ChainGains
 from quasilpv.synthesis.acceleration_design import AccelerationDesign, Progress, design_acceleration_law, no_progress
+from quasilpv.synthesis.operating_envelope import acceleration_envelope
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.registry import Robot
@@ -41,7 +42,12 @@ def acceleration_law(robot: Robot, specification: Specification, progress: Progr
         expressions=premise_and_gravity(robot),
         inputs={"controller": "dob-acceleration", "specification": specification.to_document()},
         report=design.report(),
-        witness=_witness(design),
+        witness={
+            **_witness(design),
+            "envelope": acceleration_envelope(
+                robot, law, specification.sample_period_s, design.candidate.bandwidths[0]
+            ),
+        },
     )
 
 
