@@ -1,6 +1,7 @@
 """An independent, small checker: every claim of an artifact, rebuilt from its data and decided in exact arithmetic.
 
-It shares nothing with the rooms that make a design: no LMI vocabulary, no conditions, no solver. It reads the artifact
+It shares no LMI vocabulary, no conditions and no solver with the rooms that make a design (the grid gate of torque-level
+laws, which proves nothing, uses the loops the design searches with). It reads the artifact
 as a plain document and checks the gains as shipped.
 """
 
