@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -12,10 +12,11 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from quasilpv.errors import InputError
+from quasilpv.systems.affine_terms import PremiseBasis
+from quasilpv.systems.equations import equation_matrices
 from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
-
-# Coefficients are found exactly; two ways of writing one product of doubles may still differ by rounding.
-_ROUNDING = 1e-12
+from quasilpv.systems.premise_search import find_premises
+from quasilpv.systems.uncertainty import NormBoundedUncertainty
 
 
 class SystemMatrices(NamedTuple):
@@ -83,26 +84,76 @@ class DescriptorSystem:
         A: sp.Matrix,
         B: sp.Matrix,
         C: sp.Matrix,
-        premises: Sequence[Premise],
         domain: Mapping[sp.Symbol, tuple[float, float]],
+        premises: Sequence[Premise] | None = None,
+        unknown: Collection[sp.Symbol] = (),
     ) -> DescriptorSystem:
-        """Find the coefficients of matrices that are affine in the given premises.
+        """The system of nonlinear matrices E(x), A(x), B(x), C(x) over a domain.
+
+        Args:
+            name: identifier.
+            state: the symbols of x, differential states first.
+            inputs: names of u.
+            E, A, B, C: n x n, n x n, n x m and o x n matrices of expressions.
+            domain: interval of every symbol the matrices depend on.
+            premises: what the matrices are affine in. If they are not given they are found, as few as possible, with
+                bounds proved over the domain (`find_premises`).
+            unknown: parameters unknown to the controller, for premises that are to be found.
 
         Raises:
-            InputError: an entry is not ``a_0 + sum a_k z_k(x)`` with numbers a_k (entry and remainder are named), or
-                the premises are linearly dependent (with each other or with a constant).
+            InputError: an entry is not ``a_0 + sum a_k z_k(x)`` with numbers a_k (entry and remainder are named), the
+                premises are linearly dependent (with each other or with a constant), or a found one is unbounded.
         """
-        basis = _PremiseBasis(name, premises)
-        return cls(
-            name,
-            tuple(state),
-            tuple(inputs),
-            tuple(premises),
-            E=basis.affine("E", E),
-            A=basis.affine("A", A),
-            B=basis.affine("B", B),
-            C=basis.affine("C", C),
-            domain=dict(domain),
+        if premises is None:
+            premises, matrices = find_premises((E, A, B, C), domain, unknown)
+        else:
+            basis = PremiseBasis(name, premises)
+            matrices = [basis.affine(*named) for named in (("E", E), ("A", A), ("B", B), ("C", C))]
+        affine = dict(zip("EABC", matrices, strict=True))
+        return cls(name, tuple(state), tuple(inputs), tuple(premises), **affine, domain=dict(domain))
+
+    @classmethod
+    def from_equations(
+        cls,
+        equations: Sequence[sp.Expr | sp.Eq],
+        *,
+        name: str,
+        state: Sequence[sp.Symbol],
+        inputs: Sequence[sp.Symbol],
+        domain: Mapping[sp.Symbol, tuple[float, float]],
+        outputs: Sequence[sp.Expr] | None = None,
+        unknown: Collection[sp.Symbol] = (),
+    ) -> DescriptorSystem:
+        """The system of implicit equations ``F(x, x', u) = 0``, affine in x' and u, of which x = 0 is an equilibrium.
+
+        States whose rate occurs nowhere are algebraic and come last, in the order given otherwise, like the equations
+        without a rate. How the drift is written as A(x) x: see `factored`.
+
+        Args:
+            equations: as many as states; an expression stands for itself = 0. ``rate(x1)`` is the symbol of x1'.
+            name: identifier.
+            state: the symbols of x, in any order.
+            inputs: the symbols of u.
+            domain: interval of every symbol the matrices depend on.
+            outputs: y, expressions of the state that vanish at 0; the whole state if not given.
+            unknown: parameters unknown to the controller; their premises are of kind UNKNOWN.
+
+        Raises:
+            InputError: an equation is not affine in rates and inputs, has a drift that does not vanish at x = 0 or that
+                cannot be factored (the equation is named), there are not as many equations as states, or
+                `from_symbols` refuses the matrices.
+        """
+        matrices = equation_matrices(name, equations, state, inputs, state if outputs is None else outputs)
+        return cls.from_symbols(
+            name=name,
+            state=matrices.state,
+            inputs=[symbol.name for symbol in inputs],
+            E=matrices.E,
+            A=matrices.A,
+            B=matrices.B,
+            C=matrices.C,
+            domain=domain,
+            unknown=unknown,
         )
 
     @property
@@ -163,132 +214,3 @@ class DescriptorSystem:
             if others:
                 raise InputError(self.name, f"premise {premise.name}", f"parameters {others}", "states only")
         return sp.lambdify(self.state, [premise.expression for premise in self.premises], "numpy")
-
-
-@dataclass(frozen=True, eq=False)
-class NormBoundedUncertainty:
-    """Unknown premises as ``A + H_a Delta W_a`` and ``B + H_b Delta' W_b`` with ``|Delta| <= 1``, ``|Delta'| <= 1``.
-
-    An unknown premise in [lower, upper] is ``centre + radius d`` with ``|d| <= 1``; each coefficient matrix times its
-    radius is factored at its rank k, so that Delta is diagonal, every d repeated k times.
-
-    Attributes:
-        nominal: the system at the centres of the unknown premises; the known premises remain.
-        Ha, Wa: n x k_a and k_a x n; no column if A does not depend on an unknown premise.
-        Hb, Wb: n x k_b and k_b x m.
-
-    Reference: Dehak 2022, (I.37) and Theorem I.3.
-    """
-
-    nominal: DescriptorSystem
-    Ha: NDArray[np.float64]
-    Wa: NDArray[np.float64]
-    Hb: NDArray[np.float64]
-    Wb: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, system: DescriptorSystem, unknown: Sequence[int]) -> NormBoundedUncertainty:
-        """Take the premises of the given indices for unknown.
-
-        Raises:
-            InputError: E or C depends on one of them.
-        """
-        for field in ("E", "C"):
-            matrix: AffineMatrix = getattr(system, field)
-            if matrix.coefficients[list(unknown)].any():
-                raise InputError(
-                    system.name, field, "an entry in an unknown premise", "unknown premises in A and B only"
-                )
-        known = [p for p in range(len(system.premises)) if p not in unknown]
-        centre = np.zeros(len(system.premises))
-        centre[list(unknown)] = 0.5 * (system.lower + system.upper)[list(unknown)]
-        radius = 0.5 * (system.upper - system.lower)
-
-        def nominal(matrix: AffineMatrix) -> AffineMatrix:
-            return AffineMatrix(matrix.evaluate(centre), matrix.coefficients[known])
-
-        Ha, Wa = _factored([radius[p] * system.A.coefficients[p] for p in unknown])
-        Hb, Wb = _factored([radius[p] * system.B.coefficients[p] for p in unknown])
-        return cls(
-            replace(
-                system,
-                premises=tuple(system.premises[p] for p in known),
-                E=nominal(system.E),
-                A=nominal(system.A),
-                B=nominal(system.B),
-                C=nominal(system.C),
-            ),
-            Ha,
-            Wa,
-            Hb,
-            Wb,
-        )
-
-
-def _factored(matrices: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Left factors side by side and right factors stacked, each at the rank of its matrix (full pivoting)."""
-    rows, columns = matrices[0].shape
-    left, right = [np.zeros((rows, 0))], [np.zeros((0, columns))]
-    for matrix in matrices:
-        remainder = np.array(matrix)
-        scale = np.abs(remainder).max(initial=0.0)
-        while np.abs(remainder).max(initial=0.0) > _ROUNDING * scale:
-            row, column = np.unravel_index(np.abs(remainder).argmax(), remainder.shape)
-            left.append(remainder[:, [column]])
-            right.append(remainder[[row], :] / remainder[row, column])
-            remainder = remainder - left[-1] @ right[-1]
-    return np.hstack(left), np.vstack(right)
-
-
-class _PremiseBasis:
-    """The premises as linear combinations of distinct symbolic terms, e.g. ``2 omega_1 sin(theta_2)`` and so on."""
-
-    def __init__(self, source: str, premises: Sequence[Premise]) -> None:
-        self._source = source
-        self._names = [premise.name for premise in premises]
-        expansions = [{sp.S.One: sp.S.One}] + [_expansion(premise.expression) for premise in premises]
-        self._terms = list(dict.fromkeys(term for expansion in expansions for term in expansion))
-        self._matrix = sp.Matrix([[e.get(term, 0) for e in expansions] for term in self._terms])
-        _, rows = self._matrix.T.rref()
-        if len(rows) < len(expansions):
-            names = ", ".join(self._names)
-            raise InputError(source, "premises", names, "linearly independent functions, none constant")
-        self._rows = list(rows)
-        self._inverse = self._matrix.extract(self._rows, list(range(len(expansions)))).inv()
-
-    def affine(self, field: str, matrix: sp.Matrix) -> AffineMatrix:
-        """Coefficients of every entry of a matrix."""
-        stacked = np.zeros((len(self._names) + 1, *matrix.shape))
-        for row in range(matrix.rows):
-            for column in range(matrix.cols):
-                entry = sp.sympify(matrix[row, column])
-                stacked[:, row, column] = self._coefficients(f"{field}[{row},{column}]", entry)
-        return AffineMatrix(stacked[0], stacked[1:])
-
-    def _coefficients(self, field: str, entry: sp.Expr) -> list[float]:
-        expansion = _expansion(entry)
-        solution = self._inverse * sp.Matrix([expansion.get(self._terms[row], 0) for row in self._rows])
-        explained = dict(zip(self._terms, self._matrix * solution, strict=True))
-        scale = max((abs(number) for number in expansion.values()), default=0)
-        for term, number in expansion.items():
-            if abs(number - explained.pop(term, 0)) > _ROUNDING * scale:
-                raise InputError(self._source, field, f"the term {sp.Float(number, 6) * term}", self._expected())
-        for term, number in explained.items():
-            if abs(number) > _ROUNDING * scale:
-                raise InputError(self._source, field, f"no term in {term}", self._expected())
-        return [float(number) for number in solution]
-
-    def _expected(self) -> str:
-        return f"an expression affine in the premises {', '.join(self._names) or '(none)'}"
-
-
-def _expansion(expression: sp.Expr) -> dict[sp.Expr, sp.Rational]:
-    """Write an expression as a sum of exact numbers times distinct terms."""
-    expansion: dict[sp.Expr, sp.Rational] = {}
-    for summand in sp.Add.make_args(sp.expand(expression)):
-        number, term = summand.as_coeff_Mul()
-        if term.is_number:  # pi, sqrt(2), ...: a constant like any other
-            number, term = sp.Float(summand), sp.S.One
-        exact = sp.Rational(number)
-        expansion[term] = expansion.get(term, sp.S.Zero) + exact
-    return {term: number for term, number in expansion.items() if number != 0}

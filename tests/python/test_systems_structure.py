@@ -1,0 +1,84 @@
+"""What is reported of the structure of a system is proved, and what is not true is not reported."""
+
+import pytest
+import sympy as sp
+
+from quasilpv.systems.catalogue import SYSTEMS, system
+from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.structure import Standing, StructureVerdict, structure_report
+
+x, y, w = sp.symbols("x y w", real=True)
+REGULAR = {"ex-I.1", "ex-II.9", "ex-II.8", "arm2", "arm3"}
+
+
+def toy(E: sp.Matrix, A: sp.Matrix, reach: float = 1.0) -> DescriptorSystem:
+    return DescriptorSystem.from_symbols(
+        name="toy",
+        state=(x, y),
+        inputs=("u",),
+        E=E,
+        A=A,
+        B=sp.Matrix([1, 0]),
+        C=sp.eye(2),
+        domain={x: (-reach, reach), y: (0.0, reach)},
+    )
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_every_system_of_the_catalogue_is_proved_regular_or_of_index_one(name: str) -> None:
+    report = structure_report(system(name))
+    assert report.verdict is (StructureVerdict.REGULAR if name in REGULAR else StructureVerdict.INDEX_ONE)
+    assert report.leading.standing is Standing.PROVED
+    assert report.algebraic_pivot.standing is Standing.PROVED
+    assert str(report).startswith(f"{name}: {report.verdict}")
+
+
+def test_when_the_pivot_is_zero_expect_it_refuted() -> None:
+    report = structure_report(system("ex-II.6", b=0.0))
+    assert report.verdict is StructureVerdict.NOT_PROVED
+    assert report.algebraic_pivot.standing is Standing.REFUTED
+
+
+@pytest.mark.parametrize(
+    ("pivot", "standing"),
+    [
+        (2 + x, Standing.PROVED),  # affine in its premise: decided at the corners
+        (x, Standing.REFUTED),
+        (1 + x**2 - 3 * sp.sin(x), Standing.REFUTED),  # changes sign between corners
+        # Over the box of premises x^2 and cos x are independent, and the corner (0, cos 1) is below 0.
+        (sp.Rational(6, 10) * x**2 + sp.cos(x) - sp.Rational(7, 10), Standing.PROVED),
+    ],
+)
+def test_sign_of_a_pivot_is_decided_by_proof(pivot: sp.Expr, standing: Standing) -> None:
+    report = structure_report(toy(sp.diag(1, 0), sp.Matrix([[0, 1], [1, pivot]])))
+    assert report.algebraic_pivot.standing is standing
+
+
+def test_when_only_the_relation_between_premises_makes_a_pivot_nonzero_expect_the_domain_named() -> None:
+    # The determinant is 5/2 + x^2; in the box the premises x^2 = 0 and x = 1 make it -3/2.
+    E = sp.Matrix([[1 + 2 * x**2, 2 * x], [2 * x, sp.Rational(5, 2)]])
+    report = structure_report(toy(E, sp.eye(2)))
+    assert report.leading.standing is Standing.PROVED_OVER_DOMAIN
+    assert report.verdict is StructureVerdict.REGULAR
+    assert "box" in str(report)
+
+
+def test_determinant_that_is_not_multi_affine_is_enclosed() -> None:
+    E = sp.Matrix([[2, x], [x, 2]])  # 4 - x^2 > 0 for |x| <= 1, and not affine in x
+    report = structure_report(toy(E, sp.eye(2)))
+    assert report.leading.standing is Standing.PROVED
+    assert "enclosed" in report.leading.reason
+    beyond = structure_report(toy(E, sp.eye(2), reach=3.0))
+    assert not beyond.leading.holds
+
+
+def test_when_a_premise_depends_on_an_algebraic_state_expect_assumption_1_not_proved() -> None:
+    report = structure_report(toy(sp.diag(1, 0), sp.Matrix([[y**2, 1], [1, 2]])))
+    assert report.verdict is StructureVerdict.NOT_PROVED
+    assert report.assumption_1.reason == "z1 depends on the algebraic state y"
+
+
+@pytest.mark.parametrize(("radicand", "holds"), [(1 + x**2, True), (1 + x, False)])
+def test_a_square_root_is_differentiable_where_its_argument_is_positive(radicand: sp.Expr, holds: bool) -> None:
+    report = structure_report(toy(sp.diag(1, 0), sp.Matrix([[sp.sqrt(radicand), 1], [1, 2]])))
+    assert report.assumption_1.holds is holds
