@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import StrEnum
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.conditions.slack import Slack, slack_family
 from quasilpv.lmi import Expression, Problem, Variable, block, zeros
 from quasilpv.lmi.exact import Matrix
 from quasilpv.lmi.expressions import Operand, as_expression
 
-
-class Slack(StrEnum):
-    """Which slack matrices a sum over vertices is given: additions whose weighted mean is zero by construction.
-
-    The weights of every block of a block polytope sum to 1/G, so ``sum_i w_i (T_b(i) - (1/G) sum_b T_b) = 0`` whatever
-    the T_b. In a double sum T may depend on the other index.
-    """
-
-    NONE = "none"
-    THESIS = "thesis"
-    """One T_b and one S_b per block b: ``X_ij + T_b(i) + S_b(j) - mean`` (Dehak 2022, Lemma II.1)."""
-    FULL = "full"
-    """One T_i,b per vertex i and block b: ``X_ij + T_i,b(j) - (1/G) sum_b T_i,b``, a larger family."""
+__all__ = ["Slack", "block_diagonal", "double_sum", "identity_blocks", "pole_disk", "single_sum"]
 
 
 def pole_disk(lyapunov: Operand, product: Operand, centre: Fraction, radius: Fraction) -> Expression:
@@ -76,23 +65,21 @@ def single_sum(
         The slack matrices.
     """
     entries = [entry(i) for i in range(count)]
-    slacks: tuple[Variable, ...] = ()
-    if slack_blocks is not None and len(set(slack_blocks)) > 1:
-        slack, slacks = _zero_mean(f"T {name}", slack_blocks, entries[0].shape[0])
-        entries = [X + T for X, T in zip(entries, slack, strict=True)]
+    slack = slack_family(Slack.THESIS, name, slack_blocks, entries[0].shape[0], sums=1)
     for i, X in enumerate(entries):
-        problem.negative(f"{name} {i}", X)
-    return slacks
+        problem.negative(f"{name} {i}", X + slack.at((i,)))
+    return slack.variables
 
 
 def double_sum(
     problem: Problem,
     name: str,
-    entry: Callable[[int, int], Expression],
+    entry: Callable[..., Expression],
     count: int,
     slack_blocks: npt.NDArray[np.intp] | None = None,
     *,
     slack: Slack = Slack.THESIS,
+    others: int = 0,
 ) -> tuple[Variable, ...]:
     """Require ``sum_ij w_i w_j X_ij < 0`` for all convex weights (Tuan et al. 2001, Theorem 2.2).
 
@@ -102,41 +89,27 @@ def double_sum(
     Args:
         problem: receives the inequalities, named ``"<name> i j"``.
         name: of the family.
-        entry: X_ij; only its symmetric part matters.
+        entry: X_ij; only its symmetric part matters. With `others` it has that many more indices.
         count: N.
         slack_blocks: block of every vertex, or None for no slack (a single block has none: T - mean = 0).
         slack: which family.
+        others: number of further sums over the same vertices, each with weights of its own: the inequalities are
+            required for all values of their indices.
 
     Returns:
         The slack matrices.
     """
-    grid = [[entry(i, j) for j in range(count)] for i in range(count)]
-    slacks: tuple[Variable, ...] = ()
-    if slack_blocks is not None and len(set(slack_blocks)) > 1 and slack is not Slack.NONE:
-        shift, slacks = _double_slack(name, slack_blocks, grid[0][0].shape[0], slack)
-        grid = [[grid[i][j] + shift(i, j) for j in range(count)] for i in range(count)]
-    for i in range(count):
-        problem.negative(f"{name} {i} {i}", grid[i][i])
-        for j in range(count):
-            if i != j:
-                problem.negative(f"{name} {i} {j}", grid[i][i] * Fraction(2, count - 1) + grid[i][j] + grid[j][i])
-    return slacks
-
-
-def _double_slack(
-    name: str, blocks: npt.NDArray[np.intp], size: int, slack: Slack
-) -> tuple[Callable[[int, int], Expression], tuple[Variable, ...]]:
-    """The addition to X_ij, and its unknowns."""
-    if slack is Slack.THESIS:
-        (T, ofT), (S, ofS) = (_zero_mean(f"{letter} {name}", blocks, size) for letter in "TS")
-        return lambda i, j: T[i] + S[j], ofT + ofS
-    rows = [_zero_mean(f"T {name} {i}", blocks, size) for i in range(len(blocks))]
-    return lambda i, j: rows[i][0][j], tuple(variable for _, row in rows for variable in row)
-
-
-def _zero_mean(name: str, blocks: npt.NDArray[np.intp], size: int) -> tuple[list[Expression], tuple[Variable, ...]]:
-    """``T_b(i) - (1/G) sum_b T_b`` for every vertex i, and the symmetric unknowns T_b, one per block b."""
-    groups = sorted(set(blocks.tolist()))
-    T = {b: Variable(f"{name} {b}", size, symmetric=True) for b in groups}
-    mean = sum((variable.expression for variable in T.values()), zeros(size, size)) * Fraction(-1, len(groups))
-    return [T[b] + mean for b in blocks.tolist()], tuple(T.values())
+    size = entry(*(0,) * (2 + others)).shape[0]
+    shift = slack_family(slack, name, slack_blocks, size, sums=2 + others)
+    for rest in product(range(count), repeat=others):
+        grid = [[entry(i, j, *rest) for j in range(count)] for i in range(count)]
+        label = " ".join(map(str, rest))
+        for i in range(count):
+            problem.negative(f"{name} {i} {i} {label}".rstrip(), grid[i][i] + shift.at((i, i, *rest)))
+            for j in range(count):
+                if i != j:
+                    own = Fraction(2, count - 1)
+                    added = shift.sum({(i, i, *rest): own, (i, j, *rest): Fraction(1), (j, i, *rest): Fraction(1)})
+                    tuan = grid[i][i] * own + grid[i][j] + grid[j][i]
+                    problem.negative(f"{name} {i} {j} {label}".rstrip(), tuan + added)
+    return shift.variables

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from math import isfinite
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from quasilpv.conditions.blocks import Slack
+from quasilpv.conditions.slack import Slack
 from quasilpv.errors import InputError
 from quasilpv.lmi import Problem, Variable
 from quasilpv.polytopes import PolytopicModel
@@ -38,12 +39,22 @@ class Options:
         decay_rate: alpha >= 0 with ``V' <= -2 alpha V``, 1/s; conditions without one refuse a positive value.
         form: see `Form`.
         window_s: length tau of the moving window of delayed laws, s; None is the limit tau -> 0.
+
+    Raises:
+        InputError: a number is out of range.
     """
 
     slack: Slack = Slack.THESIS
     decay_rate: float = 0.0
     form: Form = Form.REDUCED
     window_s: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse numbers without a meaning."""
+        if not (isfinite(self.decay_rate) and self.decay_rate >= 0.0):
+            raise InputError("condition", "decay rate", self.decay_rate, "a finite number >= 0")
+        if self.window_s is not None and not (isfinite(self.window_s) and self.window_s > 0.0):
+            raise InputError("condition", "window", self.window_s, "a finite time > 0, or none for the limit")
 
 
 @dataclass(frozen=True, eq=False)

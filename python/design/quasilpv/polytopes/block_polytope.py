@@ -18,6 +18,9 @@ from quasilpv.polytopes.multilinear import Matrices, MultilinearForm
 
 Vector = NDArray[np.float64]
 
+ELSEWHERE = np.iinfo(np.intp).min
+"""Stands in a table of corners for the premises of other blocks, which a vertex leaves at the centre."""
+
 
 @dataclass(frozen=True, eq=False)
 class BlockPolytope:
@@ -188,18 +191,38 @@ class BlockPolytope:
     @cached_property
     def exact_vertex_offsets(self) -> NDArray[Any]:
         """`vertex_offsets` without rounding: bounds and centre are taken as the rationals they are, (N, r)."""
+        return self.exact_offsets(range(self.vertex_count))
+
+    def exact_offsets(self, vertices: Sequence[int]) -> NDArray[Any]:
+        """Rows of `exact_vertex_offsets`, for representations with too many vertices to want them all."""
         low, high, centre = (
             np.array([Fraction(bound) for bound in bounds.tolist()], dtype=object)
             for bounds in (self.lower, self.upper, self.centre)
         )
-        offsets = np.tile(centre, (self.vertex_count, 1))
+        offsets = np.tile(centre, (len(vertices), 1))
+        for row, vertex in enumerate(vertices):
+            p = list(self._block(vertex).premises)
+            corner = low[p] + self._corner_table[vertex, p] * (high[p] - low[p])
+            offsets[row, p] += len(self.blocks) * (corner - centre[p])
+        return offsets
+
+    @cached_property
+    def _corner_table(self) -> NDArray[np.intp]:
+        """Sector coordinates of every vertex, whole numbers, (N, r); `ELSEWHERE` for premises of other blocks."""
+        table = np.full((self.vertex_count, self.premises), ELSEWHERE)
         row = 0
         for block in self.blocks:
-            p = list(block.premises)
-            corners = low[p] + block.corners().astype(int) * (high[p] - low[p])
-            offsets[row : row + block.vertices, p] += len(self.blocks) * (corners - centre[p])
+            table[row : row + block.vertices, list(block.premises)] = block.corners().astype(int)
             row += block.vertices
-        return offsets
+        return table
+
+    def equal_vertices(self, premises: Sequence[int]) -> NDArray[np.intp]:
+        """For every vertex the first one that agrees with it in the given premises, (N,): equal in what they decide."""
+        if not premises:
+            return np.zeros(self.vertex_count, dtype=np.intp)
+        corners = self._corner_table[:, list(premises)]
+        _, first, inverse = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+        return np.asarray(first[inverse.ravel()])
 
     def vertices(self, constant: ArrayLike, coefficients: ArrayLike) -> Matrices:
         """Vertices of ``X_0 + sum_p z_p X_p``: X_0 of shape (...), X_p stacked (r, ...); returns (N, ...)."""

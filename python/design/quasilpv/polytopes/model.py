@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -13,10 +14,12 @@ import numpy.typing as npt
 from quasilpv.errors import InputError
 from quasilpv.polytopes.block_polytope import BlockPolytope
 from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix, PremiseKind
+from quasilpv.systems.premise import PremiseKind
 
 ExactMatrix: TypeAlias = npt.NDArray[Any]
 """Array of `fractions.Fraction`."""
+
+Vertices: TypeAlias = tuple[ExactMatrix, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,17 +55,17 @@ class PolytopicModel:
     @cached_property
     def E(self) -> tuple[ExactMatrix, ...]:
         """Vertices E_i, (n, n) arrays of `fractions.Fraction`."""
-        return self._vertices(self.system.E)
+        return self.vertices(lambda E, A, B: E)
 
     @cached_property
     def A(self) -> tuple[ExactMatrix, ...]:
         """Vertices A_i, (n, n)."""
-        return self._vertices(self.system.A)
+        return self.vertices(lambda E, A, B: A)
 
     @cached_property
     def B(self) -> tuple[ExactMatrix, ...]:
         """Vertices B_i, (n, m)."""
-        return self._vertices(self.system.B)
+        return self.vertices(lambda E, A, B: B)
 
     @property
     def order(self) -> int:
@@ -94,16 +97,37 @@ class PolytopicModel:
         """Whether E does not depend on the premises."""
         return not self.system.E.coefficients.any()
 
-    def _vertices(self, matrix: AffineMatrix) -> tuple[ExactMatrix, ...]:
-        """One array per vertex; vertices that differ only in premises the matrix does not depend on share theirs."""
-        relevant = [p for p in range(matrix.premises) if matrix.coefficients[p].any()]
-        constant, slopes = _rational(matrix.constant), [_rational(matrix.coefficients[p]) for p in relevant]
-        computed: dict[tuple[Fraction, ...], ExactMatrix] = {}
-        for row in self.polytope.exact_vertex_offsets[:, relevant]:
-            offsets = tuple(row)
-            if offsets not in computed:
-                computed[offsets] = sum((c * X for c, X in zip(offsets, slopes, strict=True)), constant)
-        return tuple(computed[tuple(row)] for row in self.polytope.exact_vertex_offsets[:, relevant])
+    def vertices(self, function: Callable[[ExactMatrix, ExactMatrix, ExactMatrix], ExactMatrix]) -> Vertices:
+        """Vertices of an affine function of (E, A, B), exact.
+
+        Vertices that differ only in premises the function does not depend on are one and the same object: of the 4096
+        vertices of a function of three premises, eight are computed.
+
+        Args:
+            function: from exact (E, A, B) to an exact matrix.
+        """
+        origin = function(*(np.zeros(X.shape, dtype=int).astype(object) for X in self._constants))
+        slopes = {p: function(*X) - origin for p, X in self._slopes.items()}
+        slopes = {p: slope for p, slope in slopes.items() if slope.any()}
+        first = self.polytope.equal_vertices(list(slopes))
+        distinct = np.unique(first).tolist()
+        constant = function(*self._constants)
+        values = {
+            vertex: sum((offsets[p] * slope for p, slope in slopes.items()), constant)
+            for vertex, offsets in zip(distinct, self.polytope.exact_offsets(distinct), strict=True)
+        }
+        return tuple(values[vertex] for vertex in first.tolist())
+
+    @cached_property
+    def _constants(self) -> tuple[ExactMatrix, ExactMatrix, ExactMatrix]:
+        system = self.system
+        return _rational(system.E.constant), _rational(system.A.constant), _rational(system.B.constant)
+
+    @cached_property
+    def _slopes(self) -> dict[int, tuple[ExactMatrix, ExactMatrix, ExactMatrix]]:
+        """Coefficient matrices of every premise."""
+        E, A, B = (matrix.coefficients for matrix in (self.system.E, self.system.A, self.system.B))
+        return {p: (_rational(E[p]), _rational(A[p]), _rational(B[p])) for p in range(self.polytope.premises)}
 
 
 def unknown_premises(system: DescriptorSystem) -> tuple[int, ...]:
