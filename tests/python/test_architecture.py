@@ -19,6 +19,7 @@ LAYERS = (
     {"loops"},
     {"lmi"},
     {"conditions"},
+    {"studies"},
     {"synthesis"},
     {"certificate"},
     {"artifact"},

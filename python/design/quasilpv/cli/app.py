@@ -9,7 +9,20 @@ from collections.abc import Sequence
 import typer
 
 from quasilpv import __version__
-from quasilpv.cli import export_sdp, hil, inspect, listing, robust, synth, track, verify
+from quasilpv.cli import (
+    boundary,
+    complexity,
+    export_sdp,
+    hil,
+    inspect,
+    listing,
+    region,
+    robust,
+    solve,
+    synth,
+    track,
+    verify,
+)
 from quasilpv.errors import (
     ClaimError,
     FaultStop,
@@ -41,6 +54,9 @@ Examples:
   design robust out/arm3/artifact.json
   design track serial-square serial-circle
   design hil serial-square --real-time
+  design solve ex-I.1 --condition II.6 --set b=2.5
+  design boundary ex-I.1 --condition II.6 --over b=0:30
+  design region ex-I.1 --condition II.6 --x a=-8:8:17 --y b=-20:20:41
 
 \b
 Exit codes:
@@ -83,6 +99,10 @@ app.command("robust")(robust.robust_command)
 app.command("export-sdp")(export_sdp.export_sdp_command)
 app.command("track")(track.track_command)
 app.command("hil")(hil.hil_command)
+app.command("solve")(solve.solve_command)
+app.command("boundary")(boundary.boundary_command)
+app.command("region")(region.region_command)
+app.command("complexity")(complexity.complexity_command)
 
 
 def run(arguments: Sequence[str]) -> int:

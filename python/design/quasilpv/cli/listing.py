@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from quasilpv.cli.console import JsonOption, print_json, print_table
+from quasilpv.conditions.registry import CONDITIONS
 from quasilpv.scenarios import tracking_tasks
 from quasilpv.synthesis import CONTROLLERS
+from quasilpv.systems.catalogue import SYSTEMS
 from quasilpv.systems.registry import robots
 
 
 def list_command(json: JsonOption = False) -> None:
-    """List robots, controllers and scenarios.
+    """List robots, controllers, scenarios, systems and conditions.
 
     \b
     Example:
       design list --json
     """
-    known = {
+    known: dict[str, list[dict[str, Any]]] = {
         "robots": [{"id": robot.id, "summary": robot.summary} for robot in robots()],
         "controllers": [{"id": name, "summary": kind.summary} for name, kind in CONTROLLERS.items()],
         "scenarios": [{"id": task.id, "summary": task.summary, "robot": task.robot} for task in tracking_tasks()],
+        "systems": [
+            {"id": name, "summary": kind.summary, "parameters": list(kind.parameters)} for name, kind in SYSTEMS.items()
+        ],
+        "conditions": [{"id": name, "summary": entry.summary} for name, entry in CONDITIONS.items()],
     }
     if json:
         print_json(known)

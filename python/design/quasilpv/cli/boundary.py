@@ -1,0 +1,62 @@
+"""``design boundary``: where a condition stops being feasible along one parameter."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from quasilpv.cli.console import JsonOption, print_json
+from quasilpv.cli.parameters import (
+    ConditionOption,
+    DecayOption,
+    FormOption,
+    RepresentationOption,
+    SetOption,
+    SlackOption,
+    SystemArgument,
+    interval,
+    question,
+)
+from quasilpv.conditions.blocks import Slack
+from quasilpv.conditions.condition import Form, Options
+from quasilpv.studies import find_boundary
+from quasilpv.studies.boundary import RELATIVE_TOLERANCE
+
+
+def boundary_command(
+    system: SystemArgument,
+    *,
+    condition: ConditionOption,
+    over: Annotated[str, typer.Option("--over", metavar="NAME=FROM:TO", help="The parameter and its range.")],
+    representation: RepresentationOption = "",
+    slack: SlackOption = Slack.THESIS,
+    parameters: SetOption = None,
+    decay: DecayOption = 0.0,
+    form: FormOption = Form.REDUCED,
+    tolerance: Annotated[float, typer.Option("--tolerance", help="Relative width to stop at.")] = RELATIVE_TOLERANCE,
+    json: JsonOption = False,
+) -> int:
+    """Bisect for the limit of feasibility; the feasible side is proved in exact arithmetic.
+
+    Exit code 1 if neither end of the range is feasible.
+
+    \b
+    Example:
+      design boundary ex-I.1 --condition II.6 --set a=1 --over b=0:30
+    """
+    options = Options(slack=slack, decay_rate=decay, form=form)
+    searched = interval(over, "--over")
+    found = find_boundary(question(system, condition, representation, parameters, options), searched, tolerance)
+    if json:
+        print_json(found.to_document())
+    elif found.certified_up_to is None:
+        print(f"not feasible at {searched.name} = {searched.start:g}, nor at {searched.end:g}")
+    elif found.infeasible_from is None:
+        print(f"feasible, proved, up to {searched.name} = {found.certified_up_to:.6g}; no infeasible point was found")
+    else:
+        print(
+            f"{searched.name} = {found.value:.5g}: feasible, proved, up to {found.certified_up_to:.6g}; "
+            f"infeasible, numerically, from {found.infeasible_from:.6g} ({found.evaluations} points)"
+        )
+    return 1 if found.certified_up_to is None else 0

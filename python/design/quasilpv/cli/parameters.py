@@ -1,0 +1,98 @@
+"""Options that state a question: parameters, ranges and axes as a person types them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, TypeAlias
+
+import typer
+
+from quasilpv.conditions.blocks import Slack
+from quasilpv.conditions.condition import Form, Options
+from quasilpv.errors import InputError
+from quasilpv.polytopes.representation import REPRESENTATIONS
+from quasilpv.studies.boundary import Interval
+from quasilpv.studies.question import Question
+from quasilpv.studies.region import Axis
+
+SystemArgument: TypeAlias = Annotated[str, typer.Argument(metavar="SYSTEM", help="A system of design list.")]
+ConditionOption: TypeAlias = Annotated[str, typer.Option("--condition", "-c", help="A condition of design list.")]
+RepresentationOption: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--representation",
+        help=f"{' | '.join(REPRESENTATIONS)}; with the suffix @0 centred at 0 as in the thesis."
+        "  [default: the one the condition was published with]",
+    ),
+]
+SlackOption: TypeAlias = Annotated[
+    Slack, typer.Option("--slack", help="Slack matrices of sums over vertices: none, as in the thesis, or all.")
+]
+SetOption: TypeAlias = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the system; may be repeated.")
+]
+DecayOption: TypeAlias = Annotated[float, typer.Option("--decay", help="Decay rate of the closed loop, 1/s.")]
+FormOption: TypeAlias = Annotated[
+    Form, typer.Option("--form", help="As published, or reduced: equivalent and smaller where a proof allows it.")
+]
+
+
+def question(
+    system: str,
+    condition: str,
+    representation: str,
+    settings: Sequence[str] | None,
+    options: Options,
+) -> Question:
+    """The question these options state.
+
+    Raises:
+        InputError: unknown system, condition, representation or parameter, or not a number.
+    """
+    values = tuple(_named_number(text) for text in settings or ())
+    return Question(system, condition, representation, values, options)
+
+
+def interval(text: str, option: str) -> Interval:
+    """``b=0:30`` as a range of a parameter.
+
+    Raises:
+        InputError: another form.
+    """
+    name, numbers = _named_range(text, option, 2)
+    return Interval(name, numbers[0], numbers[1])
+
+
+def axis(text: str, option: str) -> Axis:
+    """``a=-8:8:17`` as equally spaced values of a parameter.
+
+    Raises:
+        InputError: another form, or a number of points that is not whole.
+    """
+    name, numbers = _named_range(text, option, 3)
+    if not numbers[2].is_integer():
+        raise InputError("command line", option, text, "a whole number of points")
+    return Axis(name, numbers[0], numbers[1], int(numbers[2]))
+
+
+def _named_number(text: str) -> tuple[str, float]:
+    name, separator, number = text.partition("=")
+    if not separator or not name:
+        raise InputError("command line", "--set", text, "NAME=VALUE")
+    return name, _number(number, "--set", text)
+
+
+def _named_range(text: str, option: str, count: int) -> tuple[str, list[float]]:
+    name, separator, numbers = text.partition("=")
+    parts = numbers.split(":")
+    if not separator or not name or len(parts) != count:
+        expected = "NAME=FROM:TO" if count == 2 else "NAME=FROM:TO:POINTS"
+        raise InputError("command line", option, text, expected)
+    return name, [_number(part, option, text) for part in parts]
+
+
+def _number(part: str, option: str, text: str) -> float:
+    try:
+        return float(part)
+    except ValueError:
+        raise InputError("command line", option, text, "numbers") from None

@@ -1,0 +1,91 @@
+"""``design region``: a map of feasibility over two parameters."""
+
+from __future__ import annotations
+
+import json as json_text
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from quasilpv.artifact.files import write_atomically
+from quasilpv.cli.console import JsonOption, print_json, print_note, progress
+from quasilpv.cli.parameters import (
+    ConditionOption,
+    DecayOption,
+    FormOption,
+    RepresentationOption,
+    SetOption,
+    SlackOption,
+    SystemArgument,
+    axis,
+    question,
+)
+from quasilpv.conditions.blocks import Slack
+from quasilpv.conditions.condition import Form, Options
+from quasilpv.errors import InputError
+from quasilpv.figures.region import region_figure
+from quasilpv.figures.style import save
+from quasilpv.studies.checkpoint import Checkpoint
+from quasilpv.studies.engines import in_processes, on_cluster
+from quasilpv.studies.region import Map, Region, counts
+
+
+def region_command(
+    system: SystemArgument,
+    *,
+    condition: ConditionOption,
+    x: Annotated[str, typer.Option("--x", metavar="NAME=FROM:TO:POINTS", help="Horizontal axis.")],
+    y: Annotated[str, typer.Option("--y", metavar="NAME=FROM:TO:POINTS", help="Vertical axis.")],
+    representation: RepresentationOption = "",
+    slack: SlackOption = Slack.THESIS,
+    parameters: SetOption = None,
+    decay: DecayOption = 0.0,
+    form: FormOption = Form.REDUCED,
+    grid: Annotated[
+        bool, typer.Option("--grid/--adaptive", help="Solve every point, or refine a coarse grid along the boundary.")
+    ] = False,
+    processes: Annotated[int, typer.Option("--processes", "-j", help="[default: one per core]")] = 0,
+    dask: Annotated[str | None, typer.Option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster.")] = None,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Where results are kept.")] = Path(
+        "out/region"
+    ),
+    json: JsonOption = False,
+) -> None:
+    """Map where a condition is feasible; every feasible point is proved in exact arithmetic.
+
+    Writes the map (JSON) and a figure. An interrupted map goes on where it stopped when the command is given again.
+
+    \b
+    Example:
+      design region ex-I.1 --condition II.6 --x a=-8:8:17 --y b=-20:20:41
+    """
+    options = Options(slack=slack, decay_rate=decay, form=form)
+    asked = question(system, condition, representation, parameters, options)
+    across, up = axis(x, "--x"), axis(y, "--y")
+    if processes < 0:
+        raise InputError("command line", "--processes", processes, "at least 1")
+    solver = on_cluster(dask) if dask else in_processes(processes or os.cpu_count() or 1)
+    memory = Checkpoint(out, asked, (across.name, up.name))
+    if memory.size:
+        print_note(f"{memory.size} points known from {memory.path}")
+    with progress(1) as steps:
+        steps.begin("points")
+        evaluation = Map(asked, across, up, solver=solver, memory=memory, progress=steps.parts)
+        region = evaluation.full() if grid else evaluation.adaptive()
+    written = _write(region, out)
+    if json:
+        print_json(region.to_document())
+        return
+    found = ", ".join(f"{number} {verdict.value}" for verdict, number in counts(region).items() if number)
+    mean = 1e3 * region.seconds / region.evaluations
+    print(f"{len(region.points)} grid points: {found}; {region.evaluations} solved, {mean:.1f} ms each")
+    print_note(f"wrote {', '.join(map(str, written))}")
+
+
+def _write(region: Region, out: Path) -> list[Path]:
+    stem = out / f"{region.question.system}-{region.question.condition}-{region.x.name}-{region.y.name}"
+    document = stem.with_name(stem.name + ".json")
+    write_atomically({document: json_text.dumps(region.to_document(), indent=2, allow_nan=False).encode()})
+    return [document, *save(region_figure([region]), stem)]

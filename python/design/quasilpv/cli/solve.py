@@ -1,0 +1,71 @@
+"""``design solve``: one condition at one parameter point."""
+
+from __future__ import annotations
+
+import math
+
+from quasilpv.cli.console import JsonOption, print_json
+from quasilpv.cli.parameters import (
+    ConditionOption,
+    DecayOption,
+    FormOption,
+    RepresentationOption,
+    SetOption,
+    SlackOption,
+    SystemArgument,
+    question,
+)
+from quasilpv.conditions.blocks import Slack
+from quasilpv.conditions.condition import Form, Options
+from quasilpv.studies import Answer, Sweep, Verdict
+from quasilpv.studies.question import margin
+
+
+def solve_command(
+    system: SystemArgument,
+    *,
+    condition: ConditionOption,
+    representation: RepresentationOption = "",
+    slack: SlackOption = Slack.THESIS,
+    parameters: SetOption = None,
+    decay: DecayOption = 0.0,
+    form: FormOption = Form.REDUCED,
+    json: JsonOption = False,
+) -> int:
+    """Decide whether a condition holds for a system: feasible with a proof, infeasible numerically, or unknown.
+
+    Exit code 0 if feasible, 1 otherwise.
+
+    \b
+    Examples:
+      design solve ex-I.1 --condition II.6 --set a=1 --set b=2.5
+      design solve ex-I.1 --condition II.6 --set b=3 --slack full --json
+    """
+    options = Options(slack=slack, decay_rate=decay, form=form)
+    asked = question(system, condition, representation, parameters, options)
+    answer = Sweep(asked, ()).at({})
+    found = margin(asked, answer)
+    if json:
+        print_json(
+            {
+                "verdict": answer.verdict.value,
+                "certified": answer.certified,
+                "margin": found if math.isfinite(found) else None,
+                "unknowns": answer.unknowns,
+                "rows": answer.rows,
+                "seconds": answer.seconds,
+            }
+        )
+    else:
+        print(_sentence(answer))
+        print(f"margin {found:.3g}, {answer.unknowns} unknowns, {answer.rows} rows, {answer.seconds:.3f} s")
+    return 0 if answer.verdict is Verdict.FEASIBLE else 1
+
+
+def _sentence(answer: Answer) -> str:
+    if answer.certified:
+        return "feasible: a solution satisfies every inequality, checked in exact arithmetic"
+    if answer.verdict is Verdict.INFEASIBLE:
+        sure = f", none of norm below {answer.excluded_norm:.1e}" if answer.excluded_norm else ""
+        return f"infeasible: the solver found no solution{sure} (numerical, not a proof)"
+    return "unknown: the solver came to no conclusion"

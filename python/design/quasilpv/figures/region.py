@@ -1,0 +1,97 @@
+"""Maps of feasibility: proved points, the boundary, and what is known not to be feasible."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, style
+from quasilpv.studies.question import Question, Verdict
+from quasilpv.studies.region import Region
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, BLACK)
+INFEASIBLE_COLOUR = "#bdbdbd"
+
+
+def region_figure(regions: Sequence[Region], title: str | None = None) -> Figure:
+    """One or several maps over the same axes.
+
+    One map shows its grid points by verdict; several are nested markers of decreasing size, largest region first, each
+    with its boundary.
+
+    Args:
+        regions: at least one, all with the same axes.
+        title: default: system and condition of the first.
+    """
+    first = regions[0]
+    with style():
+        figure = new_figure(4.2, title or _title(first.question))
+        axes = figure.add_subplot()
+        if len(regions) == 1:
+            _verdicts(axes, first)
+        else:
+            for order, region in enumerate(regions):
+                _nested(axes, region, order, len(regions))
+        axes.set_xlabel(first.x.name)
+        axes.set_ylabel(first.y.name)
+        _frame(axes, first)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    return figure
+
+
+def _verdicts(axes: Axes, region: Region) -> None:
+    looks = {
+        Verdict.INFEASIBLE: ("x", INFEASIBLE_COLOUR, "infeasible (numerical)"),
+        Verdict.UNKNOWN: ("$?$", VERMILION, "unknown"),
+        Verdict.FEASIBLE: ("o", BLUE, "feasible, proved"),
+    }
+    size = _marker_size(region)
+    for verdict, (marker, colour, label) in looks.items():
+        places = np.array([(p.x, p.y) for p in region.points if p.answer.verdict is verdict])
+        if places.size:
+            axes.plot(*places.T, linestyle="none", marker=marker, color=colour, markersize=size, label=label)
+    _boundary(axes, region, BLACK, "boundary")
+
+
+def _nested(axes: Axes, region: Region, order: int, total: int) -> None:
+    places = np.array([(p.x, p.y) for p in region.points if p.answer.verdict is Verdict.FEASIBLE]).reshape(-1, 2)
+    size = _marker_size(region) * (1.6 - order / max(1, total - 1))
+    colour = COLOURS[order % len(COLOURS)]
+    label = f"{region.question.condition}, {region.question.representation}: {len(places)} points"
+    axes.plot(
+        *places.T,
+        linestyle="none",
+        marker=MARKERS[order % len(MARKERS)],
+        markerfacecolor="none",
+        color=colour,
+        markersize=size,
+        label=label,
+    )
+
+
+def _boundary(axes: Axes, region: Region, colour: str, label: str) -> None:
+    if region.boundary:
+        middles = np.array([np.mean([c.feasible, c.other], axis=0) for c in region.boundary])
+        axes.plot(*middles.T, linestyle="none", marker=".", color=colour, markersize=3.0, label=label)
+
+
+def _marker_size(region: Region) -> float:
+    """In points, so that neighbours on the full grid do not touch."""
+    return float(np.clip(150.0 / max(region.x.count, region.y.count), 1.5, 6.0))
+
+
+def _frame(axes: Axes, region: Region) -> None:
+    for axis, limits in ((region.x, axes.set_xlim), (region.y, axes.set_ylim)):
+        half = 0.5 * abs(axis.end - axis.start) / (axis.count - 1)
+        limits(min(axis.start, axis.end) - half, max(axis.start, axis.end) + half)
+
+
+def _title(question: Question) -> str:
+    fixed = ", ".join(f"{name} = {value:g}" for name, value in question.parameters)
+    return f"{question.system}: condition {question.condition}, {question.representation}" + (
+        f", {fixed}" if fixed else ""
+    )

@@ -1,0 +1,174 @@
+"""One question: does this condition hold for this system, in this representation, at these parameters?"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from enum import StrEnum
+from typing import Any
+
+from quasilpv.conditions.condition import Options, Statement
+from quasilpv.conditions.registry import condition
+from quasilpv.lmi import Outcome, largest_margin
+from quasilpv.lmi.compiled import CompiledFamily, CompiledProblem, compile_family
+from quasilpv.lmi.feasibility import decide
+from quasilpv.polytopes import PolytopicModel, polytopic_model
+from quasilpv.systems.catalogue import SYSTEMS, system
+
+SECOND_OPINION_UNKNOWNS = 2_000
+"""Larger problems are not put to the margin program when the first solver is undecided: it would take minutes."""
+
+
+class Verdict(StrEnum):
+    """What is known. `FEASIBLE` is a theorem, `INFEASIBLE` is what a solver found."""
+
+    FEASIBLE = "feasible"
+    INFEASIBLE = "infeasible"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class Question:
+    """A condition for a system of the catalogue.
+
+    Attributes:
+        system: its id.
+        condition: its id.
+        representation: its name, see `quasilpv.polytopes.polytopic_model`; empty for the one the condition was
+            published with.
+        parameters: of the system, by name, in order of name; defaults for the others.
+        options: of the condition.
+
+    Raises:
+        InputError: there is no such system, parameter or condition.
+    """
+
+    system: str
+    condition: str
+    representation: str = ""
+    parameters: tuple[tuple[str, float], ...] = ()
+    options: Options = field(default_factory=Options)
+
+    def __post_init__(self) -> None:
+        """Fill in the representation; refuse what does not exist."""
+        if not self.representation:
+            object.__setattr__(self, "representation", condition(self.condition).representation)
+        object.__setattr__(self, "parameters", tuple(sorted(dict(self.parameters).items())))
+        condition(self.condition)
+        system(self.system, **dict(self.parameters))
+
+    def at(self, point: Mapping[str, float]) -> Question:
+        """The same question with some parameters set."""
+        return replace(self, parameters=tuple({**dict(self.parameters), **point}.items()))
+
+    def statement(self) -> Statement:
+        """The inequalities.
+
+        Raises:
+            InputError: the condition does not apply to the system, or the representation does not.
+        """
+        return condition(self.condition).build(self.model(), self.options)
+
+    def model(self) -> PolytopicModel:
+        """The system in its representation. Errors as `statement`."""
+        return polytopic_model(system(self.system, **dict(self.parameters)), self.representation)
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON-able."""
+        return {
+            "system": self.system,
+            "condition": self.condition,
+            "representation": self.representation,
+            "parameters": dict(self.parameters),
+            "options": asdict(self.options),
+        }
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is known about a question.
+
+    Attributes:
+        verdict: see `Verdict`.
+        certified: the verdict is feasible and proved in exact arithmetic.
+        excluded_norm: of an infeasible problem, how sure: no solution of smaller norm exists with all inequalities
+            at least I, as far as the solver's certificate was computed correctly. None otherwise.
+        unknowns, rows: scalar unknowns and rows (summed sizes) of the inequalities as solved.
+        seconds: wall time, building included.
+    """
+
+    verdict: Verdict
+    certified: bool
+    excluded_norm: float | None
+    unknowns: int
+    rows: int
+    seconds: float
+
+
+class Sweep:
+    """A question at many parameter points: built once where its data are affine in the swept parameters.
+
+    Args:
+        question: at any point.
+        swept: names of the parameters that change.
+    """
+
+    def __init__(self, question: Question, swept: Sequence[str]) -> None:
+        """Compile the family, if it is one."""
+        self.question = question
+        self.swept = tuple(swept)
+        self._family = self._compile()
+
+    @property
+    def updates(self) -> bool:
+        """Whether points update numbers (True) or rebuild the problem (False)."""
+        return self._family is not None
+
+    def at(self, point: Mapping[str, float]) -> Answer:
+        """Answer at a point.
+
+        Args:
+            point: a value for every swept parameter.
+        """
+        start = time.perf_counter()
+        compiled = self._problem(point)
+        decision = decide(compiled)
+        outcome = decision.outcome
+        unclear = outcome in {Outcome.UNKNOWN, Outcome.SOLVER_ONLY}
+        if unclear and compiled.layout.unknowns <= SECOND_OPINION_UNKNOWNS:
+            outcome = largest_margin(self.question.at(point).statement().problem).outcome
+        return Answer(
+            verdict=_VERDICTS.get(outcome, Verdict.UNKNOWN),
+            certified=outcome is Outcome.VERIFIED,
+            excluded_norm=decision.excluded_norm if math.isfinite(decision.excluded_norm) else None,
+            unknowns=compiled.layout.unknowns,
+            rows=sum(compiled.layout.sizes),
+            seconds=time.perf_counter() - start,
+        )
+
+    def _problem(self, point: Mapping[str, float]) -> CompiledProblem:
+        if self._family is not None:
+            return self._family.at({name: point[name] for name in self.swept})
+        return CompiledProblem.of(self.question.at(point).statement().problem)
+
+    def _compile(self) -> CompiledFamily | None:
+        parameters = SYSTEMS[self.question.system].parameters
+        if not self.swept or not all(parameters[name].affine for name in self.swept):
+            return None
+        base = {name: dict(self.question.parameters).get(name, parameters[name].default) for name in self.swept}
+        return compile_family(lambda point: self.question.at(point).statement().problem, base)
+
+
+def margin(question: Question, answer: Answer) -> float:
+    """How far a question is from the edge between feasible and infeasible; see `quasilpv.lmi.margin`.
+
+    NaN for a problem too large for the margin program, or one it has no answer for.
+    """
+    if answer.unknowns > SECOND_OPINION_UNKNOWNS:
+        return math.nan
+    return largest_margin(question.statement().problem).margin
+
+
+_VERDICTS = {Outcome.VERIFIED: Verdict.FEASIBLE, Outcome.INFEASIBLE_NUMERICALLY: Verdict.INFEASIBLE}

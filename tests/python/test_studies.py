@@ -1,0 +1,245 @@
+"""Questions, boundaries, maps and counts."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quasilpv.conditions.condition import Options
+from quasilpv.errors import InputError
+from quasilpv.lmi.compiled import CompiledProblem
+from quasilpv.lmi.feasibility import decide
+from quasilpv.studies import Answer, Question, Sweep, Verdict, count, find_boundary
+from quasilpv.studies.boundary import Interval
+from quasilpv.studies.checkpoint import Checkpoint, Forgetful
+from quasilpv.studies.engines import in_processes, on_cluster
+from quasilpv.studies.region import Axis, Map, Region, Task, counts, solve_task
+
+QUESTION = Question("ex-I.1", "II.6")
+X, Y = Axis("a", -2.0, 6.0, 5), Axis("b", -4.0, 8.0, 9)
+
+
+def make_map(**changes: object) -> Map:
+    settings: dict = {"solver": in_processes(1), "memory": Forgetful(), "progress": lambda done, total: None}
+    return Map(QUESTION, X, Y, **{**settings, **changes})
+
+
+@pytest.fixture(scope="module")
+def full_map() -> Region:
+    return make_map().full()
+
+
+def test_a_sweep_that_updates_answers_as_one_that_rebuilds() -> None:
+    sweep = Sweep(QUESTION, ("a", "b"))
+    assert sweep.updates
+    for point in ({"a": 1.0, "b": 2.6}, {"a": 1.0, "b": 2.8}, {"a": -3.0, "b": 7.25}):
+        rebuilt = Sweep(QUESTION.at(point), ()).at({})
+        assert sweep.at(point).verdict is rebuilt.verdict
+        assert (sweep.at(point).unknowns, sweep.at(point).rows) == (rebuilt.unknowns, rebuilt.rows)
+
+
+def test_a_parameter_that_moves_the_box_rebuilds_the_problem() -> None:
+    assert not Sweep(Question("arm2", "II.6"), ("theta_max",)).updates
+
+
+def test_feasible_means_certified_and_nothing_else_does(full_map: Region) -> None:
+    assert {p.answer.certified for p in full_map.points if p.answer.verdict is Verdict.FEASIBLE} == {True}
+    assert {p.answer.certified for p in full_map.points if p.answer.verdict is not Verdict.FEASIBLE} == {False}
+    assert all(counts(full_map)[verdict] > 0 for verdict in (Verdict.FEASIBLE, Verdict.INFEASIBLE))
+
+
+def test_the_boundary_is_certified_below_and_infeasible_above() -> None:
+    found = find_boundary(QUESTION.at({"a": 1.0}), Interval("b", 0.0, 30.0))
+    assert found.certified_up_to is not None
+    assert found.infeasible_from is not None
+    assert found.certified_up_to < found.infeasible_from < 1.002 * found.certified_up_to
+    sweep = Sweep(QUESTION.at({"a": 1.0}), ("b",))
+    assert sweep.at({"b": found.certified_up_to}).certified
+    assert sweep.at({"b": found.infeasible_from}).verdict is Verdict.INFEASIBLE
+
+
+def test_the_boundary_is_the_same_from_either_end() -> None:
+    up, down = (find_boundary(QUESTION.at({"a": 1.0}), Interval("b", *ends)) for ends in ((0.0, 9.0), (9.0, 0.0)))
+    assert up.value == pytest.approx(down.value, rel=2e-3)
+
+
+def test_a_range_without_a_change_has_no_boundary() -> None:
+    inside = find_boundary(QUESTION.at({"a": 1.0}), Interval("b", 0.0, 1.0))
+    assert (inside.certified_up_to, inside.infeasible_from) == (1.0, None)
+    outside = find_boundary(QUESTION.at({"a": 1.0}), Interval("b", 20.0, 30.0))
+    assert (outside.certified_up_to, outside.value) == (None, None)
+
+
+def test_adaptive_map_agrees_with_the_full_one_wherever_it_looked(full_map: Region) -> None:
+    adaptive = make_map().adaptive()
+    full = {(p.x, p.y): p.answer.verdict for p in full_map.points}
+    assert {(p.x, p.y): p.answer.verdict for p in adaptive.points}.items() <= full.items()
+    assert adaptive.boundary == full_map.boundary
+
+
+def test_every_crossing_has_a_feasible_and_another_side(full_map: Region) -> None:
+    assert full_map.boundary
+    sweep = Sweep(QUESTION, ("a", "b"))
+    for crossing in full_map.boundary:
+        ends = [dict(zip(("a", "b"), place, strict=True)) for place in (crossing.feasible, crossing.other)]
+        assert [sweep.at(end).certified for end in ends] == [True, False]
+        gaps = np.abs(np.subtract(crossing.feasible, crossing.other)) / (2.0, 1.5)
+        assert max(gaps) == pytest.approx(2.0**-5)
+
+
+def test_processes_do_not_change_a_map(full_map: Region) -> None:
+    assert without_times(make_map(solver=in_processes(2)).full()) == without_times(full_map)
+
+
+def test_a_local_cluster_does_not_change_a_map(full_map: Region) -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None, processes=True) as cluster:
+        region = make_map(solver=on_cluster(cluster.scheduler_address)).full()
+    assert without_times(region) == without_times(full_map)
+
+
+def test_a_map_interrupted_and_resumed_equals_one_that_was_not(full_map: Region, tmp_path: Path) -> None:
+    class PowerCutError(Exception):
+        pass
+
+    def solve_twelve(tasks: Sequence[Task]) -> Iterable[Answer]:
+        for number, task in enumerate(tasks):
+            if number == 12:
+                raise PowerCutError
+            yield solve_task(task)
+
+    with pytest.raises(PowerCutError):
+        make_map(solver=solve_twelve, memory=Checkpoint(tmp_path, QUESTION, ("a", "b"))).full()
+    (kept,) = tmp_path.iterdir()
+    with kept.open("a", encoding="utf-8") as file:
+        file.write('{"place": [1.0, ')  # cut while a line was being written
+    solved: list[Task] = []
+
+    def counting(tasks: Sequence[Task]) -> Iterable[Answer]:
+        solved.extend(tasks)
+        return map(solve_task, tasks)
+
+    memory = Checkpoint(tmp_path, QUESTION, ("a", "b"))
+    assert memory.size == 12
+    resumed = make_map(solver=counting, memory=memory).full()
+    assert without_times(resumed) == without_times(full_map)
+    assert len(solved) == resumed.evaluations - 12
+
+
+def test_a_checkpoint_of_something_else_is_refused(tmp_path: Path) -> None:
+    place = Checkpoint(tmp_path, QUESTION, ("a", "b")).path
+    place.write_text('{"colour": "blue"}\n', encoding="utf-8")
+    with pytest.raises(InputError, match="line 1"):
+        Checkpoint(tmp_path, QUESTION, ("a", "b"))
+    other = Checkpoint(tmp_path, replace(QUESTION, options=Options(decay_rate=1.0)), ("a", "b"))
+    assert other.path != place
+
+
+def test_no_scheduler_is_a_clear_error() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match="a running Dask scheduler"):
+        on_cluster("nowhere")
+
+
+def test_counts_are_those_of_the_formula() -> None:
+    """Theorem II.6 with r premises: n^2 (8 r + 1/2) + n (1/2 + 2 r) + 2 r m n unknowns, slack symmetric."""
+    n, m, r = 2, 1, 3
+    sizes = count(QUESTION)
+    assert sizes.vertices == 2 * r
+    assert sizes.unknowns + sizes.slack_unknowns == n**2 * 8 * r + n**2 // 2 + (n + 4 * r * n) // 2 + 2 * r * m * n
+    assert sizes.slack_unknowns == 2 * r * (2 * n) * (2 * n + 1) // 2
+    assert sizes.inequalities == (2 * r) ** 2 + 1
+    assert sizes.rows == (2 * r) ** 2 * 2 * n + n
+
+
+@pytest.mark.parametrize("axes", [("a", "a"), ("a", "colour")])
+def test_axes_that_are_no_two_parameters_are_refused(axes: tuple[str, str]) -> None:
+    with pytest.raises(InputError):
+        Map(
+            QUESTION,
+            Axis(axes[0], 0.0, 1.0, 3),
+            Axis(axes[1], 0.0, 1.0, 3),
+            solver=in_processes(1),
+            memory=Forgetful(),
+            progress=lambda done, total: None,
+        )
+
+
+def test_an_axis_of_one_point_is_refused() -> None:
+    with pytest.raises(InputError):
+        Axis("a", 0.0, 1.0, 1)
+
+
+def test_a_question_is_refused_when_asked_not_when_solved() -> None:
+    with pytest.raises(InputError):
+        Question("ex-I.1", "II.6", parameters=(("colour", 1.0),))
+    with pytest.raises(InputError):
+        Question("ex-I.1", "no such theorem")
+
+
+def without_times(region: Region) -> object:
+    document = region.to_document()
+    del document["seconds_per_point"]
+    return document
+
+
+class TestCommands:
+    """The verbs, as a person calls them."""
+
+    @staticmethod
+    def design(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "quasilpv", *arguments], capture_output=True, text=True, check=False
+        )
+
+    def test_solve_prints_the_documented_members(self) -> None:
+        done = self.design("solve", "ex-I.1", "--condition", "II.6", "--set", "b=2.5", "--json")
+        answer = json.loads(done.stdout)
+        assert done.returncode == 0
+        assert set(answer) == {"verdict", "certified", "margin", "unknowns", "rows", "seconds"}
+        assert (answer["verdict"], answer["certified"]) == ("feasible", True)
+        assert answer["margin"] > 0
+
+    def test_infeasible_is_exit_code_1_and_a_negative_margin(self) -> None:
+        done = self.design("solve", "ex-I.1", "--condition", "II.6", "--set", "b=4", "--json")
+        answer = json.loads(done.stdout)
+        assert done.returncode == 1
+        assert (answer["verdict"], answer["certified"]) == ("infeasible", False)
+        assert answer["margin"] < 0
+
+    def test_region_writes_map_and_figure(self, tmp_path: Path) -> None:
+        axes = ("--x", "a=-2:6:3", "--y", "b=-4:8:3")
+        done = self.design("region", "ex-I.1", "-c", "II.6", *axes, "-j", "1", "-o", str(tmp_path), "--json")
+        document = json.loads(done.stdout)
+        assert {"points", "boundary", "seconds_per_point"} <= set(document)
+        assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png", ".svg", ".jsonl"}
+        assert len(document["points"]) == 9
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            (("solve", "ex-I.1", "-c", "II.6", "--set", "b"), "NAME=VALUE"),
+            (("solve", "ex-I.1", "-c", "II.6", "--decay", "-1"), "decay rate"),
+            (("solve", "ex-II.7", "-c", "II.6"), "regular system"),
+            (("solve", "ex-I.1", "-c", "II.6", "--representation", "tensor"), "one of ts"),
+            (("boundary", "ex-I.1", "-c", "II.6", "--over", "b=0"), "NAME=FROM:TO"),
+            (("boundary", "ex-I.1", "-c", "II.6", "--over", "b=0:1", "--tolerance", "2"), "tolerance"),
+            (("region", "ex-I.1", "-c", "II.6", "--x", "a=0:1:2.5", "--y", "b=0:1:2"), "whole number"),
+            (("complexity", "ex-I.9", "-c", "II.6"), "ex-I.1"),
+        ],
+    )
+    def test_bad_input_is_one_line_and_exit_code_2(self, arguments: tuple[str, ...], words: str) -> None:
+        done = self.design(*arguments)
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+        assert words in done.stderr
+
+
+def test_a_compiled_problem_of_a_question_is_decided_like_its_answer() -> None:
+    statement = QUESTION.at({"a": 1.0, "b": 2.0}).statement()
+    assert decide(CompiledProblem.of(statement.problem)).feasible
