@@ -1,0 +1,69 @@
+"""A system of your own, from its equations: a DC bus that feeds a constant-power load.
+
+A 48 V source with series resistance R and inductance L charges a bus capacitor; a converter draws the power P from the
+bus whatever its voltage is. Its current falls when the voltage rises, which is a negative resistance: above a certain
+power the bus oscillates unless the source voltage is controlled. In deviations from the operating point V0, P/V0:
+
+    L i' = -R i - v + u                    current of the source
+    (C + c v) v' = i - j                   bus voltage; the capacitance of an ultracapacitor grows with its voltage
+    0 = (V0 + v) j + P/V0 v                (V0 + v)(P/V0 + j) = P, the load
+
+The load is an algebraic equation, the capacitance makes E depend on the state, and the controller does not know P.
+
+Run it: python examples/own_system.py
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import sympy as sp
+
+from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.equations import rate
+from quasilpv.systems.structure import structure_report
+
+BUS_V = 48.0
+RESISTANCE_OHM, INDUCTANCE_H = sp.Rational("0.05"), sp.Rational("0.002")
+CAPACITANCE_F, CAPACITANCE_PER_V = sp.Rational("0.005"), sp.Rational("0.00005")
+
+
+def dc_bus(deviation_max_v: float = 12.0, power_w: tuple[float, float] = (200.0, 600.0)) -> DescriptorSystem:
+    """The bus while its voltage stays within `deviation_max_v` of 48 V, for every load power in an interval."""
+    current, voltage, load, source, power = sp.symbols("i v j u P", real=True)
+    return DescriptorSystem.from_equations(
+        [
+            sp.Eq(INDUCTANCE_H * rate(current), -RESISTANCE_OHM * current - voltage + source),
+            sp.Eq((CAPACITANCE_F + CAPACITANCE_PER_V * voltage) * rate(voltage), current - load),
+            (BUS_V + voltage) * load + power / BUS_V * voltage,
+        ],
+        name="dc-bus",
+        state=(current, voltage, load),
+        inputs=(source,),
+        outputs=(current, voltage),
+        domain={voltage: (-deviation_max_v, deviation_max_v), power: power_w},
+        unknown=(power,),
+    )
+
+
+def growth_rate_per_s(system: DescriptorSystem, power_w: float) -> float:
+    """Largest real part of the eigenvalues at v = 0 without control, after elimination of the load current."""
+    q = system.differential
+    E, A, _, _ = system.evaluate([0.0, power_w])
+    reduced = A[:q, :q] - A[:q, q:] @ np.linalg.solve(A[q:, q:], A[q:, :q])
+    return float(np.linalg.eigvals(np.linalg.solve(E[:q, :q], reduced)).real.max())
+
+
+def main() -> None:
+    """Print what was found of the system."""
+    system = dc_bus()
+    print("state", system.state, "of which", system.differential, "differential; inputs", system.inputs)
+    for premise in system.premises:
+        print(f"{premise.name} = {premise.expression} in [{premise.lower}, {premise.upper}], {premise.kind}")
+    print(structure_report(system))
+    for power_w in (200.0, 600.0):
+        print(f"uncontrolled at {power_w:.0f} W: growth rate {growth_rate_per_s(system, power_w):+.1f} 1/s")
+    print("beyond the bus voltage:", structure_report(dc_bus(deviation_max_v=50.0)), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
