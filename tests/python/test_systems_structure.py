@@ -1,5 +1,8 @@
 """What is reported of the structure of a system is proved, and what is not true is not reported."""
 
+from itertools import product
+
+import numpy as np
 import pytest
 import sympy as sp
 
@@ -82,3 +85,13 @@ def test_when_a_premise_depends_on_an_algebraic_state_expect_assumption_1_not_pr
 def test_a_square_root_is_differentiable_where_its_argument_is_positive(radicand: sp.Expr, holds: bool) -> None:
     report = structure_report(toy(sp.diag(1, 0), sp.Matrix([[sp.sqrt(radicand), 1], [1, 2]])))
     assert report.assumption_1.holds is holds
+
+
+def test_inertia_of_arm3_is_invertible_at_every_posture_but_not_at_every_corner_of_its_premises() -> None:
+    model = system("arm3", theta_max=1.0)
+    report = structure_report(model)
+    assert report.verdict is StructureVerdict.REGULAR
+    assert report.leading.standing is Standing.PROVED_OVER_DOMAIN
+    corners = [model.evaluate(np.where(bits, model.upper, model.lower)).E for bits in product([0, 1], repeat=12)]
+    determinants = np.linalg.det(np.array(corners))
+    assert determinants.min() < 0 < determinants.max()
