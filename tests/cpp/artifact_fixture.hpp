@@ -123,6 +123,28 @@ struct TestArm {
     return gain;
   }
 
+  /// Y of `hinf-tracking`, and its P, in which the three states of a joint are coupled: gains near those of
+  /// `dob-torque`.
+  Eigen::MatrixXd numerator(const Eigen::VectorXd& premise) const {
+    Eigen::MatrixXd numerator(joints, 3 * joints);
+    const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(joints, joints);
+    numerator << -2.0e4 * one, -9.0e5 * one, -9.0e2 * one;
+    numerator.array() += 20.0 * premise(0);
+    return numerator;
+  }
+
+  Eigen::MatrixXd lyapunov() const {
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(3 * joints, 3 * joints);
+    for (int j = 0; j < joints; ++j) {
+      matrix(j, j) = 2.0 + 0.1 * j;
+      matrix(joints + j, joints + j) = 900.0;
+      matrix(2 * joints + j, 2 * joints + j) = 0.01;
+      matrix(j, joints + j) = matrix(joints + j, j) = -15.0;
+      matrix(j, 2 * joints + j) = matrix(2 * joints + j, j) = -0.02;
+    }
+    return matrix;
+  }
+
   Json inertia_table() const {
     return table_of([this](const Eigen::VectorXd& premise) { return inertia_of_premises(premise); });
   }
@@ -164,6 +186,10 @@ inline Json law_table(const std::string& kind, const TestArm& arm) {
     law.update({{"feedback", arm.table_of([&arm](const Eigen::VectorXd& z) { return arm.feedback(z); })},
                 {"observer", arm.table_of([&arm](const Eigen::VectorXd& z) { return arm.observer(z); })},
                 {"filter_time_constant_s", 1e-3}});
+  } else if (kind == "hinf-tracking") {
+    law.update({{"numerator", arm.table_of([&arm](const Eigen::VectorXd& z) { return arm.numerator(z); })},
+                {"lyapunov", arm.rows(arm.lyapunov())},
+                {"velocity_filter_time_constant_s", 2e-3}});
   } else if (kind == "pid") {
     law.update({{"kp", repeated(4000.0)},
                 {"kd", repeated(300.0)},

@@ -67,7 +67,7 @@ TEST(Artifact, is_the_same_from_either_twin_and_from_a_file) {
 }
 
 TEST(Artifact, loads_every_kind_for_every_number_of_joints) {
-  for (const char* kind : {"dob-acceleration", "dob-torque", "pid", "ctc", "ctc-dob"}) {
+  for (const char* kind : {"dob-acceleration", "dob-torque", "hinf-tracking", "pid", "ctc", "ctc-dob"}) {
     for (int joints = 1; joints <= kMaxJoints; ++joints) {
       const Artifact artifact = parse(artifact_table(kind, joints));
       EXPECT_EQ(artifact.law_kind(), kind);
@@ -144,6 +144,17 @@ TEST(Artifact, refuses_gain_tables_of_another_shape_or_another_schedule_than_the
   EXPECT_THAT(refused("/law/observer/blocks/1/vertices/1/12", {1.0, 2.0, 3.0}, "dob-torque"),
               HasSubstr("a.json: law.observer.blocks[1].vertices[1]: got 13 rows, expected 12"));
   EXPECT_THAT(refused("/law/filter_time_constant_s", 0, "dob-torque"), HasSubstr("law.filter_time_constant_s: got 0"));
+}
+
+TEST(Artifact, refuses_a_lyapunov_matrix_of_another_shape_or_that_is_not_symmetric_and_positive_definite) {
+  EXPECT_THAT(refused("/law/lyapunov/8", {1.0, 2.0, 3.0}, "hinf-tracking"),
+              HasSubstr("a.json: law.lyapunov[8]: got an array of 3"));
+  EXPECT_THAT(refused("/law/lyapunov/0/1", 9.0, "hinf-tracking"),
+              HasSubstr("a.json: law.lyapunov: got a matrix with asymmetry"));
+  EXPECT_THAT(refused("/law/lyapunov/0/0", 0.01, "hinf-tracking"),
+              HasSubstr("a.json: law.lyapunov: got smallest eigenvalue -"));
+  EXPECT_THAT(refused("/law/numerator/lower/0", -0.6, "hinf-tracking"),
+              HasSubstr("a.json: law.numerator: got another box, centre or partition of the premises"));
 }
 
 TEST(Artifact, refuses_an_inertia_that_is_not_symmetric) {

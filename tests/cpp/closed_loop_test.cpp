@@ -255,7 +255,7 @@ TEST_P(EveryLoop, brings_a_disturbed_arm_to_its_reference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(ClosedLoop, EveryLoop,
-                         ::testing::Values("dob-acceleration", "dob-torque", "pid", "ctc", "ctc-dob"),
+                         ::testing::Values("dob-acceleration", "dob-torque", "hinf-tracking", "pid", "ctc", "ctc-dob"),
                          [](const auto& kind) {
                            std::string name = kind.param;
                            std::replace(name.begin(), name.end(), '-', '_');

@@ -150,14 +150,46 @@ struct WrittenOutDobTorque : WrittenOutLaw {
   }
 };
 
-struct WrittenOutPid : WrittenOutLaw {
+/// The filtered speed of the laws that read speeds.
+struct WrittenOutVelocityLaw : WrittenOutLaw {
   using WrittenOutLaw::WrittenOutLaw;
   Eigen::VectorXd w;
 
-  Eigen::VectorXd step(const Sample& s) override {
+  void filter(const Eigen::VectorXd& speed) {
     const double a = std::exp(-kSamplePeriod / 2e-3);
-    w = started ? Eigen::VectorXd(a * w + (1.0 - a) * s.speed) : s.speed;
+    w = started ? Eigen::VectorXd(a * w + (1.0 - a) * speed) : speed;
     started = true;
+  }
+};
+
+struct WrittenOutHinfTracking : WrittenOutVelocityLaw {
+  using WrittenOutVelocityLaw::WrittenOutVelocityLaw;
+
+  Eigen::VectorXd step(const Sample& s) override {
+    filter(s.speed);
+    const Eigen::Index n = arm.joints;
+    Eigen::MatrixXd E = Eigen::MatrixXd::Identity(3 * n, 3 * n);
+    E.block(n, n, n, n) = arm.inertia(s.angle);
+    const Eigen::MatrixXd K = arm.numerator(arm.premises(s.angle)) * E.transpose().inverse() * arm.lyapunov().inverse();
+    const Eigen::VectorXd e = s.angle - s.reference;
+    Eigen::VectorXd state(3 * n);
+    state << e, w - s.reference_speed, -integral;
+    const Eigen::VectorXd commanded = K * state;
+    const Eigen::VectorXd applied = output.apply(commanded);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      if ((commanded(j) - applied(j)) * K(j, 2 * n + j) * e(j) <= 0.0) {
+        integral(j) -= kSamplePeriod * e(j);
+      }
+    }
+    return commanded;
+  }
+};
+
+struct WrittenOutPid : WrittenOutVelocityLaw {
+  using WrittenOutVelocityLaw::WrittenOutVelocityLaw;
+
+  Eigen::VectorXd step(const Sample& s) override {
+    filter(s.speed);
     const Eigen::VectorXd e = s.reference - s.angle;
     const Eigen::VectorXd commanded = 4000.0 * e + 300.0 * (s.reference_speed - w) + 9000.0 * integral +
                                       arm.inertia(s.angle) * s.reference_acceleration +

@@ -84,7 +84,8 @@ TEST_P(EveryLaw, gives_over_a_link_in_lock_step_the_samples_of_the_in_process_ru
   EXPECT_EQ(k, static_cast<std::size_t>(kSamples));
 }
 
-INSTANTIATE_TEST_SUITE_P(Loop, EveryLaw, ::testing::Values("dob-acceleration", "dob-torque", "pid", "ctc", "ctc-dob"),
+INSTANTIATE_TEST_SUITE_P(Loop, EveryLaw,
+                         ::testing::Values("dob-acceleration", "dob-torque", "hinf-tracking", "pid", "ctc", "ctc-dob"),
                          [](const auto& kind) {
                            std::string name = kind.param;
                            std::replace(name.begin(), name.end(), '-', '_');

@@ -219,7 +219,7 @@ VERTICES = ("law", "inertia", "blocks", 0, "vertices")
         (
             at("law", "kind", value="lqr"),
             "law",
-            "got 'lqr', expected one of 'dob-acceleration', 'dob-torque', 'pid', 'ctc', 'ctc-dob'",
+            "got 'lqr', expected one of 'dob-acceleration', 'dob-torque', 'hinf-tracking', 'pid', 'ctc', 'ctc-dob'",
         ),
         (without("law", "kind"), "law", "got nothing, expected a member 'kind'"),
         (without("law", "observer"), "law.observer", "got nothing"),

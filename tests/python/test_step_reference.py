@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from reference.step import (
     DobAcceleration,
     DobTorque,
     FloatArray,
+    HinfTracking,
     OutputStage,
     Pid,
     Sample,
@@ -29,7 +31,7 @@ RELATIVE_TOLERANCE = 1e-12  # of the largest summand: observer gains make single
 RUNS, STEPS_PER_RUN = 200, 5
 FILTER_S = 2e-3
 
-Reference = DobAcceleration | DobTorque | Pid | ComputedTorque
+Reference = DobAcceleration | DobTorque | HinfTracking | Pid | ComputedTorque
 Builder = Callable[[SerialArm, np.random.Generator, OutputStage], tuple[dict[str, Any], Callable[[], Reference]]]
 
 
@@ -104,40 +106,69 @@ def computed_torque(bandwidth: float) -> Builder:
     return build
 
 
+@dataclass(frozen=True, eq=False)
+class Scheduled:
+    """An affine matrix in the cosines an arm's inertia depends on, as a table and as a function of the angles."""
+
+    affine: FloatArray
+    joints: int
+
+    @property
+    def table(self) -> dict[str, Any]:
+        count = len(self.affine) - 1
+        polytope = BlockPolytope.per_premise([-1.0] * count, [1.0] * count)
+        return polytope.to_document(polytope.vertices(self.affine[0], self.affine[1:]))
+
+    def at(self, y: FloatArray) -> FloatArray:
+        alpha, n = np.cumsum(y), self.joints
+        z = [np.cos(alpha[k + gap] - alpha[k]) for gap in range(1, n) for k in range(n - gap)]
+        return np.asarray(self.affine[0] + np.tensordot(z, self.affine[1:], axes=1))
+
+
+def near_one(joints: int, rng: np.random.Generator) -> FloatArray:
+    """A random affine matrix near the identity, in the cosines of an arm."""
+    count = joints * (joints - 1) // 2
+    return np.asarray(np.eye(joints) + 0.1 * rng.normal(size=(count + 1, joints, joints)))
+
+
 def dob_torque(
     arm: SerialArm, rng: np.random.Generator, output: OutputStage
 ) -> tuple[dict[str, Any], Callable[[], Reference]]:
     n = len(arm.links)
-    count = n * (n - 1) // 2
-    polytope = BlockPolytope.per_premise([-1.0] * count, [1.0] * count)
-    near_one = np.eye(n) + 0.1 * rng.normal(size=(count + 1, n, n))
-    feedback = np.concatenate([-gain * near_one for gain in (5e3, 150.0, 6e4)], axis=2)
-    observer = np.concatenate([gain * near_one for gain in (2.4e3, 2e6, 8e8, 1e11)], axis=1)
-
-    def table(affine: FloatArray) -> dict[str, Any]:
-        return polytope.to_document(polytope.vertices(affine[0], affine[1:]))
-
-    def at(affine: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        def value(y: FloatArray) -> FloatArray:
-            alpha = np.cumsum(y)
-            z = [np.cos(alpha[k + gap] - alpha[k]) for gap in range(1, n) for k in range(n - gap)]
-            return np.asarray(affine[0] + np.tensordot(z, affine[1:], axes=1))
-
-        return value
-
+    one = near_one(n, rng)
+    feedback = Scheduled(np.concatenate([-gain * one for gain in (5e3, 150.0, 6e4)], axis=2), n)
+    observer = Scheduled(np.concatenate([gain * one for gain in (2.4e3, 2e6, 8e8, 1e11)], axis=1), n)
     law = {
         "kind": "dob-torque",
-        "feedback": table(feedback),
-        "observer": table(observer),
+        "feedback": feedback.table,
+        "observer": observer.table,
         "filter_time_constant_s": 1e-3,
     }
-    return law, lambda: DobTorque(at(feedback), at(observer), 1e-3, arm.mass_matrix, arm.gravity_torque, fresh(output))
+    return law, lambda: DobTorque(feedback.at, observer.at, 1e-3, arm.mass_matrix, arm.gravity_torque, fresh(output))
+
+
+def hinf_tracking(
+    arm: SerialArm, rng: np.random.Generator, output: OutputStage
+) -> tuple[dict[str, Any], Callable[[], Reference]]:
+    n = len(arm.links)
+    one = near_one(n, rng)
+    numerator = Scheduled(np.concatenate([-gain * one for gain in (4e3, 9e4, 7e2)], axis=2), n)
+    root = np.diag(np.repeat([1.0, 30.0, 1.0 / 30.0], n)) @ (np.eye(3 * n) + 0.1 * rng.normal(size=(3 * n, 3 * n)))
+    lyapunov = (root @ root.T + (root @ root.T).T) / 2.0
+    law = {
+        "kind": "hinf-tracking",
+        "numerator": numerator.table,
+        "lyapunov": lyapunov.tolist(),
+        "velocity_filter_time_constant_s": FILTER_S,
+    }
+    return law, lambda: HinfTracking(numerator.at, lyapunov, arm.mass_matrix, speed_filter(), fresh(output))
 
 
 LAWS: dict[str, Builder] = {
     "dob-acceleration": dob_acceleration(compensate=True),
     "dob-acceleration without compensation": dob_acceleration(compensate=False),
     "dob-torque": dob_torque,
+    "hinf-tracking": hinf_tracking,
     "pid": pid,
     "ctc": computed_torque(0.0),
     "ctc-dob": computed_torque(200.0),

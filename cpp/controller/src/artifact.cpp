@@ -59,25 +59,32 @@ std::array<Interval, kMaxJoints> intervals(const Field& field, int joints) {
   return result;
 }
 
+void require_symmetric(const Field& field, const std::string& name, const Eigen::MatrixXd& matrix,
+                       const std::string& expected) {
+  const double asymmetry = (matrix - matrix.transpose()).cwiseAbs().maxCoeff();
+  if (!(asymmetry <= kSymmetryTolerance * matrix.cwiseAbs().maxCoeff())) {
+    field.fail(name + " with asymmetry " + Json(asymmetry).dump(), expected);
+  }
+}
+
+void require_positive_definite(const Field& field, const std::string& where, const Eigen::MatrixXd& matrix,
+                               const std::string& expected) {
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
+  const double smallest = eigenvalues.minCoeff();
+  if (!(smallest > kDefinitenessTolerance * eigenvalues.cwiseAbs().maxCoeff())) {
+    field.fail("smallest eigenvalue " + Json(smallest).dump() + where, expected);
+  }
+}
+
 // Only the centre is tested for definiteness: premises depend on each other, so a corner of the box need not be a
 // configuration of the robot, and the design inertia may rightly be indefinite there.
 BlockPolytope parse_inertia(const Field& field, int joints) {
   BlockPolytope inertia = BlockPolytope::parse(field, joints, joints);
   for (int i = 0; i < inertia.vertices(); ++i) {
-    const Eigen::MatrixXd& vertex = inertia.vertex(i);
-    const double asymmetry = (vertex - vertex.transpose()).cwiseAbs().maxCoeff();
-    if (!(asymmetry <= kSymmetryTolerance * vertex.cwiseAbs().maxCoeff())) {
-      field["blocks"].fail("vertex " + std::to_string(i) + " with asymmetry " + Json(asymmetry).dump(),
-                           "symmetric vertices");
-    }
+    require_symmetric(field["blocks"], "vertex " + std::to_string(i), inertia.vertex(i), "symmetric vertices");
   }
-  const Eigen::VectorXd eigenvalues =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(inertia.at_centre(), Eigen::EigenvaluesOnly).eigenvalues();
-  const double smallest = eigenvalues.minCoeff();
-  if (!(smallest > kDefinitenessTolerance * eigenvalues.cwiseAbs().maxCoeff())) {
-    field.fail("smallest eigenvalue " + Json(smallest).dump() + " at the centre of the box",
-               "a positive definite inertia");
-  }
+  require_positive_definite(field, " at the centre of the box", inertia.at_centre(), "a positive definite inertia");
   return inertia;
 }
 
@@ -120,6 +127,18 @@ DobTorqueParameters parse_dob_torque(const Field& law, const Field& programs, in
   BlockPolytope feedback = parse_gains(law["feedback"], model.inertia, joints, 3 * joints);
   BlockPolytope observer = parse_gains(law["observer"], model.inertia, 4 * joints, joints);
   return {std::move(model), std::move(feedback), std::move(observer), law["filter_time_constant_s"].positive()};
+}
+
+HinfTrackingParameters parse_hinf_tracking(const Field& law, const Field& programs, int joints) {
+  programs.only({"premises", "gravity"});
+  law.only({"kind", "numerator", "lyapunov", "velocity_filter_time_constant_s", "inertia"});
+  DesignModel model = parse_model(law, programs, joints);
+  BlockPolytope numerator = parse_gains(law["numerator"], model.inertia, joints, 3 * joints);
+  Eigen::MatrixXd lyapunov = parse_matrix(law["lyapunov"], 3 * joints, 3 * joints);
+  require_symmetric(law["lyapunov"], "a matrix", lyapunov, "a symmetric matrix");
+  require_positive_definite(law["lyapunov"], "", lyapunov, "a positive definite matrix");
+  return {std::move(model), std::move(numerator), std::move(lyapunov),
+          law["velocity_filter_time_constant_s"].non_negative()};
 }
 
 PidParameters parse_pid(const Field& law, const Field& programs, int joints) {
@@ -209,12 +228,14 @@ void Artifact::parse_law(const Field& law, const Field& programs) {
     law_ = parse_dob_acceleration(law, programs, joints_);
   } else if (law_kind_ == "dob-torque") {
     law_ = parse_dob_torque(law, programs, joints_);
+  } else if (law_kind_ == "hinf-tracking") {
+    law_ = parse_hinf_tracking(law, programs, joints_);
   } else if (law_kind_ == "pid") {
     law_ = parse_pid(law, programs, joints_);
   } else if (law_kind_ == "ctc" || law_kind_ == "ctc-dob") {
     law_ = parse_computed_torque(law, programs, joints_);
   } else {
-    law["kind"].fail(Json(law_kind_).dump(), "dob-acceleration, dob-torque, pid, ctc or ctc-dob");
+    law["kind"].fail(Json(law_kind_).dump(), "dob-acceleration, dob-torque, hinf-tracking, pid, ctc or ctc-dob");
   }
 }
 

@@ -11,18 +11,6 @@ namespace {
 constexpr std::size_t kMaxBlockPremises = 12;  // 4096 vertices: bounds the time of one evaluation
 constexpr double kCollapseTolerance = 1e-9;    // relative to the largest entry of the vertices
 
-Eigen::MatrixXd parse_matrix(const Field& field, int rows, int columns) {
-  if (field.size() != static_cast<std::size_t>(rows)) {
-    field.fail(std::to_string(field.size()) + " rows", std::to_string(rows));
-  }
-  Eigen::MatrixXd matrix(rows, columns);
-  for (int i = 0; i < rows; ++i) {
-    const std::vector<double> row = field.at(static_cast<std::size_t>(i)).numbers(static_cast<std::size_t>(columns));
-    matrix.row(i) = Eigen::Map<const Eigen::RowVectorXd>(row.data(), columns);
-  }
-  return matrix;
-}
-
 // Premises of one block, marked in `seen`.
 std::vector<int> parse_block_premises(const Field& field, std::vector<bool>& seen) {
   if (field.size() > kMaxBlockPremises || (field.size() == 0 && !seen.empty())) {
@@ -41,6 +29,18 @@ std::vector<int> parse_block_premises(const Field& field, std::vector<bool>& see
 }
 
 }  // namespace
+
+Eigen::MatrixXd parse_matrix(const Field& field, int rows, int columns) {
+  if (field.size() != static_cast<std::size_t>(rows)) {
+    field.fail(std::to_string(field.size()) + " rows", std::to_string(rows));
+  }
+  Eigen::MatrixXd matrix(rows, columns);
+  for (int i = 0; i < rows; ++i) {
+    const std::vector<double> row = field.at(static_cast<std::size_t>(i)).numbers(static_cast<std::size_t>(columns));
+    matrix.row(i) = Eigen::Map<const Eigen::RowVectorXd>(row.data(), columns);
+  }
+  return matrix;
+}
 
 BlockPolytope BlockPolytope::parse(const Field& field, int rows, int columns) {
   field.only({"premises", "lower", "upper", "centre", "blocks"});

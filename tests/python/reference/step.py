@@ -173,6 +173,31 @@ class SpeedFilter:
 
 
 @dataclass
+class HinfTracking:
+    """u = K (y - r, w - r', int (y - r)), K = Y E^-T P^-1, E = diag(I, M, I) (Dehak 2022, III.39 and III.43)."""
+
+    numerator: Model
+    lyapunov: FloatArray
+    inertia: Model
+    speed_filter: SpeedFilter
+    output: OutputStage
+    integral: FloatArray | None = None
+
+    def step(self, s: Sample) -> Answer:
+        w, n = self.speed_filter.apply(s.speed), s.angle.size
+        integral = np.zeros_like(w) if self.integral is None else self.integral
+        E = np.eye(3 * n)
+        E[n : 2 * n, n : 2 * n] = self.inertia(s.angle)
+        K = self.numerator(s.angle) @ np.linalg.inv(self.lyapunov @ E)  # E = E', so E^-T P^-1 = (P E)^-1
+        error = s.angle - s.reference_angle
+        state = np.concatenate([error, w - s.reference_speed, integral])
+        commanded = K @ state
+        applied = self.output.apply(commanded)
+        self.integral = integrate(integral, error, np.diag(K[:, 2 * n :]), self.output.T, commanded - applied)
+        return Answer(commanded, applied, np.zeros_like(w), (np.abs(K) @ np.abs(state),))
+
+
+@dataclass
 class Pid:
     """u = kp e + kd (r' - w) + ki int e + M r'' + N(y, w) r' + G with e = r - y (Dehak 2022, III.54)."""
 

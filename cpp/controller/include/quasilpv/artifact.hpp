@@ -41,6 +41,14 @@ struct DobTorqueParameters {
   double filter_time_constant_s = 0.0;  ///< of the disturbance filter, > 0
 };
 
+/// Kind `hinf-tracking`: the gain Y(z) E(z)^-T P^-1 with E = diag(I, M_n, I), acting on (y - r, w - r', int (y - r)).
+struct HinfTrackingParameters {
+  DesignModel model;
+  BlockPolytope numerator;                       ///< Y, n x 3n
+  Eigen::MatrixXd lyapunov;                      ///< P, 3n x 3n, symmetric positive definite
+  double velocity_filter_time_constant_s = 0.0;  ///< 0: no filter
+};
+
 /// Kind `pid`: gains in N m/rad, N m s/rad, N m/(rad s), acting on r - y.
 struct PidParameters {
   DesignModel model;
@@ -62,8 +70,8 @@ struct ComputedTorqueParameters {
   double disturbance_observer_bandwidth_rad_s = 0.0;  ///< 0: kind `ctc`
 };
 
-using LawParameters =
-    std::variant<DobAccelerationParameters, DobTorqueParameters, PidParameters, ComputedTorqueParameters>;
+using LawParameters = std::variant<DobAccelerationParameters, DobTorqueParameters, HinfTrackingParameters,
+                                   PidParameters, ComputedTorqueParameters>;
 
 /// Interval of one joint.
 struct Interval {

@@ -8,6 +8,9 @@
 
 namespace quasilpv {
 
+/// An array of `rows` rows of `columns` numbers. INIT-ONLY. Throws InputError for another shape.
+Eigen::MatrixXd parse_matrix(const Field& field, int rows, int columns);
+
 /// A matrix X(z) given by vertices: X(z) = sum over blocks b and corners c of w_bc(z) X_bc, with
 /// w_bc(z) = (1/G) prod_p omega_p^{c_p}(z_p) >= 0 and sum_c w_bc = 1/G for each of the G blocks.
 ///

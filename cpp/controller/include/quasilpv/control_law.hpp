@@ -37,6 +37,8 @@ struct LawSettings {
 std::unique_ptr<ControlLaw> make_law(const DobAccelerationParameters& parameters, const LawSettings& settings);
 /// Law of Dehak 2022, Theorem IV.11, in torque coordinates with scheduled gains. INIT-ONLY.
 std::unique_ptr<ControlLaw> make_law(const DobTorqueParameters& parameters, const LawSettings& settings);
+/// H-infinity PI tracking, Dehak 2022, Theorem III.10. INIT-ONLY.
+std::unique_ptr<ControlLaw> make_law(const HinfTrackingParameters& parameters, const LawSettings& settings);
 /// PID with feedforward, Dehak 2022 (III.54). INIT-ONLY.
 std::unique_ptr<ControlLaw> make_law(const PidParameters& parameters, const LawSettings& settings);
 /// Computed torque with and without disturbance observer, Dehak 2022 (III.56). INIT-ONLY.

@@ -140,15 +140,25 @@ class PolytopeTable(StrictModel):
             matrix = np.array(vertex)
             if matrix.shape != (size, size):
                 raise FieldError(f"{field}.{path}", f"{len(vertex)} x {len(vertex[0])}", f"{size} x {size}")
-            asymmetry = np.abs(matrix - matrix.T)
-            if asymmetry.max() > ROUNDING * np.abs(matrix).max():
-                i, j = np.unravel_index(int(asymmetry.argmax()), asymmetry.shape)
-                expected = f"{vertex[j][i]}, the symmetric entry"
-                raise FieldError(f"{field}.{path}[{i}][{j}]", vertex[i][j], expected)
-        eigenvalues = np.linalg.eigvalsh(self.at_centre())
-        smallest, largest = eigenvalues[0], np.abs(eigenvalues).max()
-        if not smallest > ROUNDING * largest:
-            raise FieldError(field, f"smallest eigenvalue {smallest:.3g} at the centre", "a positive definite inertia")
+            require_symmetric(f"{field}.{path}", vertex)
+        require_positive_definite(field, self.at_centre(), "a positive definite inertia", " at the centre")
+
+
+def require_symmetric(field: str, rows: Matrix) -> None:
+    """Raise ``FieldError`` unless a square matrix is symmetric."""
+    matrix = np.array(rows)
+    asymmetry = np.abs(matrix - matrix.T)
+    if asymmetry.max() > ROUNDING * np.abs(matrix).max():
+        i, j = np.unravel_index(int(asymmetry.argmax()), asymmetry.shape)
+        raise FieldError(f"{field}[{i}][{j}]", rows[i][j], f"{rows[j][i]}, the symmetric entry")
+
+
+def require_positive_definite(field: str, matrix: npt.NDArray[np.float64], expected: str, where: str = "") -> None:
+    """Raise ``FieldError`` unless a symmetric matrix is positive definite."""
+    eigenvalues = np.linalg.eigvalsh(matrix)
+    smallest, largest = eigenvalues[0], np.abs(eigenvalues).max()
+    if not smallest > ROUNDING * largest:
+        raise FieldError(field, f"smallest eigenvalue {smallest:.3g}{where}", expected)
 
 
 class Feedback(StrictModel):
@@ -184,6 +194,28 @@ class DobTorqueLaw(StrictModel):
     observer: PolytopeTable
     filter_time_constant_s: Positive
     inertia: PolytopeTable
+
+
+class HinfTrackingLaw(StrictModel):
+    """H-infinity PI tracking (Dehak 2022, Theorem III.10): ``Gamma = Y(z) diag(I, M, I)^-1 P^-1 (e, e', int e)``.
+
+    ``numerator`` holds Y, n x 3n; ``lyapunov`` is P, 3n x 3n; e = x - x_r.
+    """
+
+    kind: Literal["hinf-tracking"]
+    numerator: PolytopeTable
+    lyapunov: Matrix
+    velocity_filter_time_constant_s: NonNegative
+    inertia: PolytopeTable
+
+    @model_validator(mode="after")
+    def _check_lyapunov(self) -> Self:
+        rows = len(self.lyapunov)
+        if any(len(row) != rows for row in self.lyapunov):
+            raise FieldError("lyapunov", "rows of other lengths", f"a {rows} x {rows} matrix")
+        require_symmetric("lyapunov", self.lyapunov)
+        require_positive_definite("lyapunov", np.array(self.lyapunov), "a positive definite matrix")
+        return self
 
 
 class PidLaw(StrictModel):
@@ -231,11 +263,14 @@ class CtcDobLaw(_ComputedTorque):
         return self
 
 
-Law = Annotated[DobAccelerationLaw | DobTorqueLaw | PidLaw | CtcLaw | CtcDobLaw, Field(discriminator="kind")]
+Law = Annotated[
+    DobAccelerationLaw | DobTorqueLaw | HinfTrackingLaw | PidLaw | CtcLaw | CtcDobLaw, Field(discriminator="kind")
+]
 
 GAIN_FIELDS: Mapping[str, tuple[str, ...]] = {
     "dob-acceleration": (),
     "dob-torque": (),
+    "hinf-tracking": (),
     "pid": ("kp", "kd", "ki"),
     "ctc": ("gp", "gd", "gi"),
     "ctc-dob": ("gp", "gd", "gi"),
@@ -251,6 +286,7 @@ PROGRAM_INPUTS: Mapping[str, tuple[str, ...]] = {
 REQUIRED_PROGRAMS: Mapping[str, tuple[str, ...]] = {
     "dob-acceleration": ("premises", "gravity"),
     "dob-torque": ("premises", "gravity"),
+    "hinf-tracking": ("premises", "gravity"),
     "pid": ("premises", "gravity", "coriolis_reference"),
     "ctc": ("premises", "gravity", "coriolis"),
     "ctc-dob": ("premises", "gravity", "coriolis"),
@@ -315,6 +351,9 @@ class Artifact(StrictModel):
         if isinstance(self.law, DobTorqueLaw):
             self.law.feedback.require_gains("law.feedback", n, 3 * n, self.law.inertia)
             self.law.observer.require_gains("law.observer", 4 * n, n, self.law.inertia)
+        if isinstance(self.law, HinfTrackingLaw):
+            self.law.numerator.require_gains("law.numerator", n, 3 * n, self.law.inertia)
+            require_size("law.lyapunov", self.law.lyapunov, 3 * n)
         self._check_programs()
         return self
 
