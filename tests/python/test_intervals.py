@@ -11,7 +11,8 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from quasilpv.errors import InputError
-from quasilpv.systems.intervals import enclose
+from quasilpv.systems.intervals import _IntervalFunction, _lower, _upper, enclose
+from quasilpv.systems.quotients import expm1_quotient, tanh_quotient
 
 x, y, w = sp.symbols("x y w", real=True)
 
@@ -105,6 +106,37 @@ def test_bounds_are_rounded_outward() -> None:
 def test_a_product_of_independent_factors_is_exact() -> None:
     low, high = enclose((2 * w + y) * sp.sin(x), {w: (-1.0, 2.0), y: (-3.0, 0.5), x: (1.0, 2.0)})
     assert_allclose((low, high), (-5.0, 4.5), rtol=1e-15)
+
+
+QUOTIENTS = {sp.tanh: np.tanh, tanh_quotient: tanh_quotient._imp_, expm1_quotient: expm1_quotient._imp_}
+
+
+@pytest.mark.parametrize("function", QUOTIENTS, ids=str)
+@given(intervals(), st.sampled_from([1.0, 1e-3, 1e-6]))
+def test_monotone_functions_are_enclosed_exactly(
+    function: type[sp.Function], interval: tuple[float, float], scale: float
+) -> None:
+    ends = (interval[0] * scale, interval[1] * scale)
+    low, high = enclose(function(x), {x: ends})
+    values = QUOTIENTS[function](np.append(np.linspace(*ends, 2001), 0.0 if ends[0] <= 0 <= ends[1] else ends[0]))
+    assert low <= values.min() + 1e-15 * abs(values.min())  # the samples are rounded too
+    assert high >= values.max() - 1e-15 * abs(values.max())
+    assert_allclose([low, high], [values.min(), values.max()], rtol=1e-13, atol=1e-22)  # 80 bits around 1
+
+
+@pytest.mark.parametrize("function", [sp.tanh, sp.sinc, tanh_quotient, expm1_quotient], ids=str)
+@given(intervals())
+def test_slopes_of_functions_contain_their_difference_quotients(
+    function: type[sp.Function], interval: tuple[float, float]
+) -> None:
+    _, (slope,) = _IntervalFunction(function(x), [x]).value_and_gradient((interval,))
+    values = sp.lambdify([x], function(x), "numpy")
+    points = np.linspace(*interval, 401)
+    rises = np.diff(np.broadcast_to(values(points), points.shape))
+    widths = np.diff(points)
+    rounding = 1e-14 * (1 + np.abs(values(points[1:])))
+    assert np.all(rises >= _lower(slope) * widths - rounding)
+    assert np.all(rises <= _upper(slope) * widths + rounding)
 
 
 REALS = (-float("inf"), float("inf"))

@@ -14,17 +14,29 @@ from quasilpv.systems.catalogue import system
 from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.equations import factored, rate
 from quasilpv.systems.premise import PremiseKind
+from quasilpv.systems.quotients import expm1_quotient, tanh_quotient
 from quasilpv.systems.registry import robots
 
 x1, x2, x3, u, force, delta = sp.symbols("x1 x2 x3 u lambda delta", real=True)
 z3 = sp.Symbol("z3", real=True)
 BOX = {x1: (-3.0, 3.0), x2: (-2.0, 2.0), x3: (-1.0, 1.0), force: (-9.0, 9.0)}
-FACTORS = [x1, x2, x3, sp.sin(x1), sp.sin(x1 - 2 * x3), sp.cos(x2), 1 / (1 + x2**2), sp.exp(-x1), sp.sin(x1 * x2)]
+FACTORS = [
+    x1,
+    x2,
+    x3,
+    sp.sin(x1),
+    sp.sin(x1 - 2 * x3),
+    sp.cos(x2),
+    1 / (1 + x2**2),
+    sp.exp(-x1),
+    sp.sin(x1 * x2),
+    sp.tanh(2 * x3),
+]
 
 
 @st.composite
 def drifts(draw: st.DrawFn) -> sp.Expr:
-    total = 2 * (1 - sp.cos(x1)) * draw(st.integers(0, 1))
+    total = 2 * (1 - sp.cos(x1)) * draw(st.integers(0, 1)) + (sp.exp(3 * x2 - x1) - 1) * draw(st.integers(0, 1))
     for _ in range(draw(st.integers(1, 4))):
         factors = draw(st.lists(st.sampled_from(FACTORS), min_size=1, max_size=3))
         term = draw(st.integers(1, 9)) * sp.Mul(*factors)
@@ -51,6 +63,8 @@ def test_factored_row_times_the_state_is_the_drift(drift: sp.Expr, values: list[
         (sp.sin(x1) * x2, [0, sp.sin(x1)]),  # a state before a sine
         (sp.sin(x1 + 2 * x2) * sp.cos(x1), [sp.sinc(x1 + 2 * x2) * sp.cos(x1), 2 * sp.sinc(x1 + 2 * x2) * sp.cos(x1)]),
         (1 - sp.cos(x1), [x1 / 2 * sp.sinc(x1 / 2) ** 2, 0]),
+        (3 * sp.tanh(x2 / 2), [0, 3 * tanh_quotient(x2 / 2) / 2]),
+        (sp.exp(2 * x1) - 1, [2 * expm1_quotient(2 * x1), 0]),
     ],
 )
 def test_terms_are_divided_by_the_documented_rule(drift: sp.Expr, row: list[sp.Expr]) -> None:
@@ -221,11 +235,26 @@ def test_unknown_parameters_of_the_equations_are_unknown_premises() -> None:
     ]
 
 
+def test_a_diode_and_smooth_friction_are_factored_and_bounded() -> None:
+    model = DescriptorSystem.from_equations(
+        [rate(x1) + 2 * (sp.exp(x1 / 3) - 1) - x2, rate(x2) + x1 + sp.tanh(5 * x2) - u],
+        name="diode",
+        state=(x1, x2),
+        inputs=(u,),
+        domain=BOX,
+    )
+    assert_allclose(model.premises[0].bounds, [1 - np.exp(-1.0), np.e - 1.0])  # (e^w - 1)/w for |w| <= 1
+    assert_allclose(model.premises[1].bounds, [np.tanh(10.0) / 10.0, 1.0])
+    for v, w in [(0.0, 0.0), (1.5, -0.3), (-3.0, 2.0)]:
+        A = model.evaluate(model.premise_values([v, w])).A
+        assert_allclose(A @ [v, w], [-2 * np.expm1(v / 3) + w, -v - np.tanh(5 * w)], rtol=1e-13, atol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("equations", "words"),
     [
         ([rate(x1) - x2, rate(x2) - 9.81 + u], r"equation 2: drift at x = 0: got 9.81"),
-        ([rate(x1) - x2, rate(x2) - sp.exp(x1) + 1], r"equation 2: drift: got exp\(x1\) - 1"),
+        ([rate(x1) - x2, rate(x2) - sp.sqrt(1 + x1**2) + 1], r"equation 2: drift: got sqrt\(x1\*\*2 \+ 1\) - 1"),
         ([rate(x1) ** 2 - x2, rate(x2) - u], r"equation 1: coefficient of x1'"),
         ([rate(x1) - x2, rate(x2) - u**2], r"equation 2: coefficient of u"),
         ([rate(x1) - x2, u * rate(x2) - x1], r"equation 2: coefficient of x2'"),

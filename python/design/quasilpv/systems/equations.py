@@ -12,6 +12,14 @@ from typing import NamedTuple
 import sympy as sp
 
 from quasilpv.errors import InputError
+from quasilpv.systems.quotients import expm1_quotient, tanh_quotient
+
+# f(w)/w of functions that vanish at 0, and functions that are 1 there as 1 plus a multiple of w.
+_QUOTIENTS = {sp.sin: sp.sinc, sp.tanh: tanh_quotient}
+_AROUND_ONE = {
+    sp.cos: lambda w: 1 - w**2 / 2 * sp.sinc(w / 2) ** 2,
+    sp.exp: lambda w: 1 + w * expm1_quotient(w),
+}
 
 
 class EquationMatrices(NamedTuple):
@@ -86,8 +94,10 @@ def factored(
 
     * a product of powers of states by the last algebraic state in it, so that premises depend on differential states if
       they can (Assumption 1), otherwise by the last state in it: ``x1 x2^2 = (x1 x2) x2``, ``x^3 = (x^2) x``;
-    * a term without such a state by the argument of its first sine: ``sin w = sinc(w) w``, w factored in its turn;
-    * cosines of terms left over as ``cos w = 1 - (w/2) sinc(w/2)^2 w``: ``1 - cos x = (x/2) sinc(x/2)^2 x``.
+    * a term without such a state by the argument of its first sine or tanh: ``sin w = sinc(w) w``, w factored in its
+      turn, ``tanh w = tanh_quotient(w) w``;
+    * in terms left over, ``cos w = 1 - (w/2) sinc(w/2)^2 w`` and ``e^w = 1 + expm1_quotient(w) w``: so
+      ``1 - cos x = (x/2) sinc(x/2)^2 x``.
 
     Raises:
         InputError: the expression does not vanish at x = 0, or a term is none of these.
@@ -97,14 +107,12 @@ def factored(
         raise InputError(source, "drift at x = 0", constant, "0: take the equilibrium as origin, or make it an input")
     row = dict.fromkeys(state, sp.S.Zero)
     left_over = _share_out(source, expression, row, algebraic)
-    refused = _share_out(source, left_over.replace(sp.cos, _cosine_by_sinc), row, algebraic)
+    for function, around_one in _AROUND_ONE.items():
+        left_over = left_over.replace(function, around_one)
+    refused = _share_out(source, left_over, row, algebraic)
     if refused != 0:
-        raise InputError(source, "drift", refused, "terms with a factor that is a state, sin w or 1 - cos w")
+        raise InputError(source, "drift", refused, "terms with a factor x, sin w, tanh w, 1 - cos w or e^w - 1")
     return [row[symbol] for symbol in state]
-
-
-def _cosine_by_sinc(w: sp.Expr) -> sp.Expr:
-    return 1 - w**2 / 2 * sp.sinc(w / 2) ** 2
 
 
 def _share_out(
@@ -123,16 +131,16 @@ def _share_out(
 def _divided(
     source: str, term: sp.Expr, state: Sequence[sp.Symbol], algebraic: Sequence[sp.Symbol]
 ) -> dict[sp.Symbol, sp.Expr]:
-    """Quotients of a term by states, none if it has no factor that is a state or a sine."""
+    """Quotients of a term by states, none if it has no factor that is a state, a sine or a tanh."""
     powers = term.as_powers_dict()
     plain = [symbol for symbol in state if powers.get(symbol, sp.S.Zero).is_positive and powers[symbol] >= 1]
     for candidates in ([s for s in plain if s in algebraic], plain):
         if candidates:
             return {candidates[-1]: term / candidates[-1]}
     for base in sorted(powers, key=sp.default_sort_key):
-        if isinstance(base, sp.sin) and powers[base] >= 1:
-            argument = base.args[0]
+        if base.func in _QUOTIENTS and powers[base] >= 1:
+            (argument,) = base.args
             row = factored(source, argument, state, algebraic)
-            quotient = term / base * sp.sinc(argument)
+            quotient = term / base * _QUOTIENTS[base.func](argument)
             return {symbol: quotient * part for symbol, part in zip(state, row, strict=True) if part != 0}
     return {}

@@ -11,22 +11,32 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache, reduce
+from functools import reduce
 from itertools import count
-from math import inf, isfinite, nextafter, pi
+from math import inf, isfinite, nextafter
 from operator import mul
 from typing import Any
 
 import sympy as sp
-from mpmath import findroot, libmp, mp, workprec
-from mpmath.ctx_iv import MPIntervalContext
+from mpmath import libmp, mp
 
 from quasilpv.errors import InputError
+from quasilpv.systems.interval_functions import (
+    expm1_ratio,
+    expm1_ratio_slope,
+    iv,
+    sinc,
+    sinc_slope,
+    tanh,
+    tanh_ratio,
+    tanh_ratio_slope,
+    tanh_slope,
+)
+from quasilpv.systems.quotients import expm1_quotient, tanh_quotient
 
-_PRECISION_BITS = 80
 _MAX_BOXES = 2_000  # reached only if the extremum is not isolated
-_iv = MPIntervalContext()
-_iv.prec = _PRECISION_BITS
+
+_OPERATIONS = "+, *, integer power, square root, sin, cos, exp, tanh, sinc, expm1_quotient or tanh_quotient"
 
 Box = tuple[tuple[float, float], ...]
 IntervalValue = Any  # mpmath's interval type carries no annotations
@@ -39,7 +49,8 @@ def enclose(
     """Bounds (lower, upper) that the expression cannot leave while its symbols stay in the domain.
 
     Args:
-        expression: sums, products, integer powers, square roots, sin, cos, exp and sinc (sin(x)/x, 1 at 0) of symbols.
+        expression: sums, products, integer powers, square roots, sin, cos, exp, tanh, sinc (sin(x)/x, 1 at 0) and the
+            functions of `quotients`, of symbols.
         domain: the interval of every symbol that occurs. It may be unbounded if every symbol occurs once, as in
             1/(1 + x^2).
         tolerance: largest excess over the exact range, relative to max(1, |bound|). If `_MAX_BOXES` boxes do not reach
@@ -119,7 +130,7 @@ def _bound_and_shrink(function: _IntervalFunction, box: Box) -> tuple[float, Box
     mean_value = function.value(centre)
     influence = []
     for slope, (low, high), (middle, _) in zip(gradient, shrunk, centre, strict=True):
-        offset = slope * (_iv.mpf([low, high]) - middle)
+        offset = slope * (iv.mpf([low, high]) - middle)
         mean_value += offset
         influence.append(0.0 if low == high else max(_upper(offset.delta), 5e-324))
     bound = max(bound, _lower(mean_value))
@@ -164,7 +175,7 @@ class _IntervalFunction:
 
     def _evaluate(self, box: Box, with_gradient: bool) -> tuple[IntervalValue, list[IntervalValue]]:
         axes = range(len(box) if with_gradient else 0)
-        zero = _iv.mpf(0)
+        zero = iv.mpf(0)
         values: dict[sp.Basic, IntervalValue] = {}
         slopes: dict[sp.Basic, list[IntervalValue]] = {}
         for node in self._nodes:
@@ -172,8 +183,8 @@ class _IntervalFunction:
                 values[node] = self._constants[node]
                 slopes[node] = [zero for _ in axes]
             elif node in self._symbols:
-                values[node] = _iv.mpf(list(box[self._symbols[node]]))
-                slopes[node] = [_iv.mpf(1 if axis == self._symbols[node] else 0) for axis in axes]
+                values[node] = iv.mpf(list(box[self._symbols[node]]))
+                slopes[node] = [iv.mpf(1 if axis == self._symbols[node] else 0) for axis in axes]
             else:
                 arguments = [values[argument] for argument in node.args]
                 values[node] = _apply(node, arguments)
@@ -186,17 +197,17 @@ class _IntervalFunction:
 
 def _number(node: sp.Basic) -> IntervalValue:
     if node is sp.pi:
-        return _iv.pi
+        return iv.pi
     if isinstance(node, sp.Rational | sp.Float):
         exact = sp.Rational(node)
-        return _iv.mpf(int(exact.p)) / _iv.mpf(int(exact.q))
+        return iv.mpf(int(exact.p)) / iv.mpf(int(exact.q))
     return _apply(node, [_number(argument) for argument in node.args])
 
 
 def _apply(node: sp.Basic, arguments: list[IntervalValue]) -> IntervalValue:
     """The exact range (rounded outward) of one operation over the ranges of its arguments."""
     if isinstance(node, sp.Add):
-        return sum(arguments, _iv.mpf(0))
+        return sum(arguments, iv.mpf(0))
     if isinstance(node, sp.Mul):
         return reduce(mul, arguments)
     value, _ = _rules(node)
@@ -206,13 +217,13 @@ def _apply(node: sp.Basic, arguments: list[IntervalValue]) -> IntervalValue:
 def _partials(node: sp.Basic, arguments: list[IntervalValue]) -> list[IntervalValue]:
     """Ranges of the partial derivatives of one operation with respect to its arguments."""
     if isinstance(node, sp.Add):
-        return [_iv.mpf(1)] * len(arguments)
+        return [iv.mpf(1)] * len(arguments)
     if isinstance(node, sp.Mul):
         return [
-            reduce(mul, arguments[:skipped] + arguments[skipped + 1 :], _iv.mpf(1)) for skipped in range(len(arguments))
+            reduce(mul, arguments[:skipped] + arguments[skipped + 1 :], iv.mpf(1)) for skipped in range(len(arguments))
         ]
     _, slope = _rules(node)
-    constant_exponent = [_iv.mpf(0)] * (len(arguments) - 1)
+    constant_exponent = [iv.mpf(0)] * (len(arguments) - 1)
     return [slope(arguments[0]), *constant_exponent]
 
 
@@ -225,7 +236,7 @@ def _rules(node: sp.Basic) -> tuple[Rule, Rule]:
         return lambda x: _square_root(x, node), lambda x: _square_root_slope(x, node)
     if node.func in _UNARY:
         return _UNARY[node.func]
-    raise InputError("expression", "operation", node, "+, *, integer power, square root, sin, cos, exp or sinc")
+    raise InputError("expression", "operation", node, _OPERATIONS)
 
 
 def _integer_power(base: IntervalValue, exponent: int, node: sp.Basic) -> IntervalValue:
@@ -239,74 +250,21 @@ def _integer_power(base: IntervalValue, exponent: int, node: sp.Basic) -> Interv
 def _square_root(x: IntervalValue, node: sp.Basic) -> IntervalValue:
     if x.a < 0:
         raise InputError("expression", "square root", node, "an argument >= 0 on the domain")
-    return _iv.sqrt(x)
+    return iv.sqrt(x)
 
 
 def _square_root_slope(x: IntervalValue, node: sp.Basic) -> IntervalValue:
-    return 1 / (2 * _square_root(x, node)) if x.a > 0 else _iv.mpf([0, inf])
-
-
-def _sinc(x: IntervalValue) -> IntervalValue:
-    """Range of sin(x)/x: end points of |x| and the stationary points in between (tan x = x)."""
-    magnitude = abs(x)
-    candidates = [_sinc_at(magnitude.a), _sinc_at(magnitude.b)]
-    # Stationary point k >= 1 lies in (k pi, k pi + pi/2) with |sinc| = 1/sqrt(1 + x^2), which decreases with k and
-    # alternates in sign: only the first two inside the interval can be extreme.
-    first = max(1, int(_lower(magnitude) / pi) - 1)
-    inside = []
-    for k in range(first, first + 4):
-        stationary = _sinc_stationary_point(k)
-        if stationary.b >= magnitude.a and stationary.a <= magnitude.b:
-            inside.append(_sinc_at(stationary))
-    candidates += inside
-    return _iv.mpf([min(c.a for c in candidates), max(c.b for c in candidates)])
-
-
-def _sinc_at(x: IntervalValue) -> IntervalValue:
-    """sin(x)/x on an interval as thin as a point, x >= 0."""
-    if x.b == 0:
-        return _iv.mpf(1)
-    if x.b < 1e-4:  # alternating series with decreasing terms
-        return _iv.mpf([1 - (x * x / 6).b, (1 - x * x / 6 + x**4 / 120).b])
-    return _iv.sin(x) / x
-
-
-@lru_cache(maxsize=64)
-def _sinc_stationary_point(k: int) -> IntervalValue:
-    """Interval proved to hold the root of x cos x = sin x in (k pi, k pi + pi/2).
-
-    The derivative of x cos x - sin x is -x sin x, of one sign between multiples of pi: a sign change proves the root.
-    """
-    with workprec(_PRECISION_BITS + 40):
-        guess = (k + mp.mpf(1) / 2) * mp.pi
-        root = findroot(lambda x: x * mp.cos(x) - mp.sin(x), guess - 1 / guess)
-        width = mp.mpf(2) ** (20 - _PRECISION_BITS)
-        low, high = _iv.mpf(root - width), _iv.mpf(root + width)
-    ends = [x * _iv.cos(x) - _iv.sin(x) for x in (low, high)]
-    if not (ends[0].b < 0 < ends[1].a or ends[1].b < 0 < ends[0].a):
-        raise ArithmeticError(f"stationary point {k} of sinc is not bracketed")
-    return _iv.mpf([low.a, high.b])
-
-
-def _sinc_slope(x: IntervalValue) -> IntervalValue:
-    """Range of the derivative of sinc, (cos x - sinc x)/x, an odd function bounded by 0.4365 in magnitude."""
-    bound = _iv.mpf([-0.4365, 0.4365])
-    magnitude = abs(x)
-    if magnitude.b <= 1:  # -x/3 + x^3/30 - x^5/840 + ... alternates with decreasing terms
-        cubic = x**3
-        slope = -x / 3 + _iv.mpf([min(0, (cubic / 30).a), max(0, (cubic / 30).b)])
-    elif magnitude.a > 0:
-        slope = (_iv.cos(x) - _sinc(x)) / x
-    else:
-        return bound
-    return _iv.mpf([max(slope.a, bound.a), min(slope.b, bound.b)])
+    return 1 / (2 * _square_root(x, node)) if x.a > 0 else iv.mpf([0, inf])
 
 
 _UNARY: dict[Any, tuple[Rule, Rule]] = {
-    sp.sin: (_iv.sin, _iv.cos),
-    sp.cos: (_iv.cos, lambda x: -_iv.sin(x)),
-    sp.exp: (_iv.exp, _iv.exp),
-    sp.sinc: (_sinc, _sinc_slope),
+    sp.sin: (iv.sin, iv.cos),
+    sp.cos: (iv.cos, lambda x: -iv.sin(x)),
+    sp.exp: (iv.exp, iv.exp),
+    sp.tanh: (tanh, tanh_slope),
+    sp.sinc: (sinc, sinc_slope),
+    expm1_quotient: (expm1_ratio, expm1_ratio_slope),
+    tanh_quotient: (tanh_ratio, tanh_ratio_slope),
 }
 
 
