@@ -7,17 +7,13 @@ the problem is solved, the gains and the witness are shipped, and the checker mu
 from __future__ import annotations
 
 import importlib
-import importlib.util
-import sys
-from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
 
 from quasilpv.certificate import CHECKERS, Verification
+from reference.mutants import BLOCKS, Mutant
 from reference.shipped_laws import (
     DECAY,
     DISK,
@@ -31,49 +27,9 @@ from reference.shipped_laws import (
     torque_document,
 )
 
-BLOCKS = "quasilpv.conditions.blocks"
 CHAINS = "quasilpv.conditions.sampled_chains"
 REDUCED = "quasilpv.conditions.iv11_reduced"
 BACK_OFF = 0.02
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """One error in one block.
-
-    Attributes:
-        block: which, rows and columns of blocks counted from 1.
-        right, wrong: the piece of source and what takes its place.
-        room: module the piece is in, if it is not the builder's.
-        place: which of the occurrences of the piece, counted from 0, and how many there are.
-    """
-
-    block: str
-    right: str
-    wrong: str
-    room: str = ""
-    place: tuple[int, int] = (0, 1)
-
-    def loaded(self, monkeypatch: pytest.MonkeyPatch, builder: str) -> ModuleType:
-        """The builder's module, made anew with this error in it."""
-        module = ModuleType("nothing")
-        for name in dict.fromkeys((BLOCKS, builder)):
-            spec = importlib.util.find_spec(name)
-            assert spec is not None
-            assert spec.origin is not None
-            source = Path(spec.origin).read_text(encoding="utf-8")
-            if name == (self.room or builder):
-                source = self._applied(source, name)
-            module = importlib.util.module_from_spec(spec)
-            monkeypatch.setitem(sys.modules, name, module)
-            exec(compile(source, spec.origin, "exec"), module.__dict__)
-        return module
-
-    def _applied(self, source: str, name: str) -> str:
-        index, count = self.place
-        parts = source.split(self.right)
-        assert len(parts) == count + 1, f"{self.right!r} is {len(parts) - 1} times in {name}: adapt this mutant"
-        return self.right.join(parts[: index + 1]) + self.wrong + self.right.join(parts[index + 1 :])
 
 
 def chain(module: Any, side: str) -> Any:
@@ -176,7 +132,8 @@ def test_when_the_sampled_observer_builder_errs_expect_the_checker_to_refuse(
 DECAY_OF_THE_ERROR = "he(closed[i] @ E[j].T) + (E[i] @ P @ E[j].T) * (2 * decay)"
 BOUNDED_REAL_ROW = "[decreasing, constant(B), E[i] @ P @ C.T]"
 DISK_ROW = "(E[i] @ P @ E[j].T) * -disk, closed[i]]"
-OFF_DIAGONAL = "Fraction(2, count - 1) + grid[i][j] + grid[j][i]"
+EQUAL = 'problem.negative(f"{name} {i} {i} {label}".rstrip(), grid[i][i] + shift.at((i, i, *rest)))'
+OFF_DIAGONAL = "grid[i][i] * own + grid[i][j] + grid[j][i]"
 
 REDUCED_FEEDBACK = (
     Mutant("closed loop sign", "[A @ P + B @ Yi for", "[A @ P - B @ Yi for"),
@@ -198,9 +155,9 @@ REDUCED_FEEDBACK = (
     Mutant("disk 11 inertia", DISK_ROW, "P * -disk, closed[i]]"),
     Mutant("disk 12", DISK_ROW, "(E[i] @ P @ E[j].T) * -disk, zeros(3 * n, 3 * n)]"),
     Mutant("disk 22", "[None, P * -disk]]", "[None, P * (-2 * disk)]]"),
-    Mutant("sum, equal indices", 'problem.negative(f"{name} {i} {i}", grid[i][i])', "pass", BLOCKS),
-    Mutant("sum, unequal indices", OFF_DIAGONAL, "Fraction(2, count - 1)", BLOCKS),
-    Mutant("sum, sign", OFF_DIAGONAL, "Fraction(2, count - 1) - grid[i][j] - grid[j][i]", BLOCKS),
+    Mutant("sum, equal indices", EQUAL, "pass", BLOCKS),
+    Mutant("sum, unequal indices", OFF_DIAGONAL, "grid[i][i] * own", BLOCKS),
+    Mutant("sum, sign", OFF_DIAGONAL, "grid[i][i] * own - grid[i][j] - grid[j][i]", BLOCKS),
 )
 
 REDUCED_OBSERVER = (

@@ -1,8 +1,8 @@
 """An independent, small checker: every claim of an artifact, rebuilt from its data and decided in exact arithmetic.
 
-It shares no LMI vocabulary, no conditions and no solver with the rooms that make a design (the grid gate of torque-level
-laws, which proves nothing, uses the loops the design searches with). It reads the artifact
-as a plain document and checks the gains as shipped.
+It shares no LMI vocabulary, no conditions and no solver with the rooms that make a design (the grid gate of
+torque-level laws, which proves nothing, uses the loops the design searches with). It reads the artifact as a plain
+document and checks the gains as shipped.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from quasilpv.certificate.design_model import check_design_model
 from quasilpv.certificate.gate import RobustGate, robust_gate
 from quasilpv.certificate.gate_data import HALF_A_SAMPLE, law_kind
 from quasilpv.certificate.grid_gate import GridGate, grid_gate
+from quasilpv.certificate.hinf_law import check_hinf_tracking
 from quasilpv.certificate.sampled_chains import check_dob_acceleration
 from quasilpv.certificate.torque_law import check_dob_torque
 from quasilpv.errors import InputError
@@ -30,12 +31,14 @@ Gate: TypeAlias = RobustGate | GridGate
 CHECKERS: Mapping[str, tuple[Checker, ...]] = {
     "dob-acceleration": (check_dob_acceleration, check_design_model),
     "dob-torque": (check_dob_torque, check_design_model),
+    "hinf-tracking": (check_hinf_tracking, check_design_model),
 }
 """How each law kind is checked: its inequalities, then its design model; kinds without an entry make no claim."""
 
 GATES: Mapping[str, Callable[[Mapping[str, Any], str, fmpq], Gate]] = {
     "dob-acceleration": robust_gate,
     "dob-torque": grid_gate,
+    "hinf-tracking": grid_gate,
 }
 """The robust gate of each law kind: a proof where the loop decouples, a grid elsewhere."""
 

@@ -22,8 +22,10 @@ from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_ran
 from quasilpv.certificate.gate_rationals import to_float
 from quasilpv.certificate.vertex_tables import VertexTable
 from quasilpv.loops.frozen_loop import FloatArray, FrozenLaw
+from quasilpv.loops.hinf_law import hinf_tracking_law
 from quasilpv.loops.loop_grid import PAYLOAD_FRACTIONS, LoopGrid, WorstLoop, configurations
 from quasilpv.loops.torque_law import TorqueLaw
+from quasilpv.loops.velocity_law import VelocityLaw
 
 CURVE_FACTORS = 25
 CURVE_REACH = 1.3
@@ -161,5 +163,19 @@ def _premises_at(data: ArmInertiaData, angles: FloatArray) -> FloatArray:
     return np.array(columns).reshape(len(columns), len(angles)).T
 
 
-FROZEN_LAWS: Mapping[str, FrozenLawBuilder] = {"dob-torque": frozen_torque_law}
+def frozen_hinf_law(document: Mapping[str, Any], angles: FloatArray) -> VelocityLaw:
+    """The law `hinf-tracking` of an artifact at B configurations, (B, n), its premises clamped to their box."""
+    law = document["law"]
+    cosines = _premises_at(arm_inertia_data(document), angles)
+    numerator, inertia = (VertexTable.parse(law[name]).evaluate(cosines) for name in ("numerator", "inertia"))
+    return hinf_tracking_law(
+        float(document["sample_period_s"]),
+        float(law["velocity_filter_time_constant_s"]),
+        numerator,
+        inertia,
+        np.array(law["lyapunov"], dtype=float),
+    )
+
+
+FROZEN_LAWS: Mapping[str, FrozenLawBuilder] = {"dob-torque": frozen_torque_law, "hinf-tracking": frozen_hinf_law}
 """How each law kind without a proof is frozen; a new one is one function here."""

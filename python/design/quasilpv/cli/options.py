@@ -19,7 +19,10 @@ SHORT_NAMES = {"acceleration": "dob-acceleration", "torque": "dob-torque"}
 
 RateOption: TypeAlias = Annotated[
     float | None,
-    typer.Option("--rate-hz", help="Sample rate; the controller is designed for it.  [default: 1000, dob-torque 4000]"),
+    typer.Option(
+        "--rate-hz",
+        help="Sample rate; the controller is designed for it.  [default: 1000, dob-torque and hinf-tracking 4000]",
+    ),
 ]
 EncoderOption: TypeAlias = Annotated[
     int | None,

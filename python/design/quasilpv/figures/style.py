@@ -29,11 +29,17 @@ BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
     "#D55E00",
     "#CC79A7",
 )
+PLUM, BROWN, NAVY = "#6A2F5B", "#8A5A00", "#12355B"
+"""Dark shades of `PURPLE`, `ORANGE` and `SKY`, for the tuned versions of what these stand for."""
 JOINT_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 CONTROLLER_COLOURS = {
     "pid": PURPLE,
+    "pid-tuned": PLUM,
     "ctc": ORANGE,
+    "ctc-tuned": BROWN,
     "ctc-dob": SKY,
+    "ctc-dob-tuned": NAVY,
+    "hinf-tracking": VERMILION,
     "dob-torque": GREEN,
     "dob-acceleration": BLUE,
 }

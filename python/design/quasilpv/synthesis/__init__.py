@@ -12,6 +12,7 @@ from quasilpv.errors import InputError
 from quasilpv.synthesis import baselines, tuned_baselines
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.acceleration_law import acceleration_law
+from quasilpv.synthesis.hinf_tracking import hinf_tracking
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.torque_law import torque_law
 from quasilpv.synthesis.tracking_design import TrackingDesign
@@ -44,6 +45,11 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
     "ctc-tuned": ControllerKind("ctc, tuned as dob-acceleration is", tuned_baselines.computed_torque_tuned),
     "ctc-dob-tuned": ControllerKind(
         "ctc-dob, tuned as dob-acceleration is", tuned_baselines.computed_torque_with_observer_tuned
+    ),
+    "hinf-tracking": ControllerKind(
+        "H-infinity PI tracking with limited gains (Dehak 2022, Theorem III.10), measured speeds, no feedforward",
+        hinf_tracking,
+        rate_hz=4000.0,
     ),
     "dob-torque": ControllerKind(
         "disturbance-observer tracking at the torque level (Dehak 2022, Theorem IV.11), positions only",

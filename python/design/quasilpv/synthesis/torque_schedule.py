@@ -1,16 +1,18 @@
-"""What `dob-torque` is scheduled with, and the law as vertex tables on that schedule."""
+"""What a torque-level law is scheduled with, and `dob-torque` as vertex tables on that schedule."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
 from quasilpv.errors import InfeasibleError
+from quasilpv.loops.frozen_loop import FrozenLaw
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.torque_law import TorqueLaw
 from quasilpv.polytopes import BlockPolytope
@@ -58,6 +60,18 @@ def schedule(robot: Robot) -> Schedule:
     raise InfeasibleError(f"{robot.id}: no dob-torque design: the inertia at the middle of the box is not definite")
 
 
+def full_schedule(robot: Robot) -> Schedule:
+    """All inertia premises.
+
+    Raises:
+        InfeasibleError: at some corner of their box the inertia is not positive definite.
+    """
+    whole = _schedule_of(robot, tuple(range(len(robot.model.inertia_premises(robot.domain)))))
+    if math.isinf(whole.spread):
+        raise InfeasibleError(f"{robot.id}: the nominal inertia is not definite at every corner of the premise box")
+    return whole
+
+
 def _schedule_of(robot: Robot, chosen: tuple[int, ...]) -> Schedule:
     premises, affine = robot.model.inertia_premises(robot.domain), robot.model.inertia_affine()
     middle = np.array([(p.lower + p.upper) / 2.0 for p in premises])
@@ -97,6 +111,13 @@ class ScheduledLaw:
         return TorqueLaw(self.sample_period_s, self.filter_time_constant_s, *tables)
 
 
+class Scheduled(Protocol):
+    """A law as vertex tables."""
+
+    def at(self, premises: FloatArray, /) -> FrozenLaw:
+        """The law frozen at B premise vectors, (B, p)."""
+
+
 @dataclass(frozen=True, eq=False)
 class ScheduledPlants:
     """A grid of plants and the scheduled premises at its configurations, (B, p)."""
@@ -111,6 +132,6 @@ class ScheduledPlants:
         values = np.array([evaluate(*theta) for theta in plants.angles], dtype=float)
         return cls(plants, values.reshape(len(plants.angles), len(premises)))
 
-    def loops(self, law: ScheduledLaw) -> LoopGrid:
+    def loops(self, law: Scheduled) -> LoopGrid:
         """A law against all plants."""
         return self.plants.loops(law.at(self.premises))
