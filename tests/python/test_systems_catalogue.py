@@ -39,18 +39,6 @@ def sinc(x: float) -> float:
     return sin(x) / x if x else 1.0
 
 
-def premise_vector(model: DescriptorSystem, x: np.ndarray, unknown: dict[str, float] | None = None) -> np.ndarray:
-    """z at a state, unknown premises given by the names of their symbols."""
-    values = dict(zip(model.state, x, strict=True))
-    names = unknown or {}
-    return np.array(
-        [
-            float(p.expression.evalf(subs=values | {s: names[s.name] for s in p.expression.free_symbols - set(values)}))
-            for p in model.premises
-        ]
-    )
-
-
 def sampled_states(model: DescriptorSystem, count: int, seed: int) -> Iterator[np.ndarray]:
     bounds = np.clip([model.domain[symbol] for symbol in model.state], -8.0, 8.0)
     yield from np.random.default_rng(seed).uniform(*bounds.T, size=(count, len(bounds)))
@@ -81,9 +69,9 @@ def test_premise_bounds_are_proved_by_interval_arithmetic_and_no_wider_than_that
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_sampled_premises_stay_in_their_bounds(name: str) -> None:
     model = system(name)
-    unknown = {str(s): interval[0] for s, interval in model.domain.items()}
+    parameters = {symbol: model.domain[symbol][0] for symbol in model.parameters}
     for x in sampled_states(model, 100, seed=1):
-        z = premise_vector(model, x, unknown)
+        z = model.premise_values(x, parameters)
         assert np.all(z >= model.lower - 1e-14)
         assert np.all(z <= model.upper + 1e-14)
 
@@ -155,7 +143,7 @@ def test_example_one_is_the_printed_nonlinear_equations(a: float, b: float, valu
             -1.5 * x1 + (b * (2 + x1**2) * rational * sinc(x2) - 3) * x2 + (a * cc - 2) * u,
         ]
     )
-    E, A, B, _ = model.evaluate(model.premise_values([x1, x2 or 1e-300]))
+    E, A, B, _ = model.evaluate(model.premise_values([x1, x2]))
     assert_allclose(E @ rate, left, rtol=1e-12, atol=1e-12)
     assert_allclose(A @ [x1, x2] + B[:, 0] * u, right, rtol=1e-12, atol=1e-9)
 
@@ -189,7 +177,7 @@ def test_singular_examples_are_the_printed_matrices(name: str) -> None:
     Wa = np.array([[0.3, 0.1, 0.3]]) - np.array([[0.2, 0.2, 0.0]])
     for x in sampled_states(model, 20, seed=3):
         z1, z2, z3 = exp(-2 * x[0]) / (1 + exp(-2 * x[0])), (1 + sin(x[1]) ** 2) / 2, sin(0.1 * x[0])
-        E, A, B, _ = model.evaluate(premise_vector(model, x, {"z3": z3}))
+        E, A, B, _ = model.evaluate(model.premise_values(x, dict.fromkeys(model.parameters, z3)))
         assert_allclose(E, [[1, 0, 0], [z1, 1, 0], [0, 0, 0]], atol=1e-14)
         nominal = [[-z2 - 5, 1, z2], [z2, b * z2 - b, 1], [(a + 2) * z2 - 2, 0, 1]]
         assert_allclose(A, nominal + Ha @ Wa * z3, atol=1e-13)

@@ -158,7 +158,7 @@ def test_examples_rebuilt_from_their_equations_are_those_of_the_catalogue(
     for _ in range(20):
         at = {symbol: rng.uniform(-1, 1) for symbol in (*known.state, z3, delta)}
         ours, theirs = (
-            model.evaluate([float(p.expression.subs(at)) for p in model.premises]) for model in (rebuilt, known)
+            model.evaluate(model.premise_values([at[s] for s in model.state], at)) for model in (rebuilt, known)
         )
         assert_allclose(ours.E, theirs.E, atol=1e-13)
         assert_allclose(_in_order(ours.A, rebuilt), _in_order(theirs.A, known), atol=1e-12)
@@ -258,10 +258,13 @@ def test_a_diode_and_smooth_friction_are_factored_and_bounded() -> None:
         ([rate(x1) ** 2 - x2, rate(x2) - u], r"equation 1: coefficient of x1'"),
         ([rate(x1) - x2, rate(x2) - u**2], r"equation 2: coefficient of u"),
         ([rate(x1) - x2, u * rate(x2) - x1], r"equation 2: coefficient of x2'"),
+        ([rate(x1) - x2, sp.Eq(1, 2)], r"equation 2: got False"),
         ([rate(x1) - x2], r"got 1 equations, expected 2"),
         ([rate(x1) + rate(x2) - u, x1 + x2], r"expected diag\(E_1, 0\)"),
     ],
 )
-def test_when_equations_have_no_descriptor_form_expect_the_equation_named(equations: list[sp.Expr], words: str) -> None:
+def test_when_equations_have_no_descriptor_form_expect_the_equation_named(
+    equations: list[sp.Expr | sp.Eq], words: str
+) -> None:
     with pytest.raises(InputError, match=words):
         DescriptorSystem.from_equations(equations, name="toy", state=(x1, x2), inputs=(u,), domain=BOX)

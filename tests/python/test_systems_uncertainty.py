@@ -15,6 +15,7 @@ from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.premise import Premise, PremiseKind
 
 UNCERTAIN = ["ex-III.10", "ex-III.11", "ex-III.12", "spring-disc"]
+MODELS = {name: system(name) for name in UNCERTAIN}
 
 
 def test_only_systems_with_unknown_premises_have_an_uncertainty() -> None:
@@ -26,7 +27,7 @@ def test_only_systems_with_unknown_premises_have_an_uncertainty() -> None:
 def test_nominal_plus_factors_is_the_system_at_every_value_of_the_unknown_premise(
     name: str, d: float, known: float
 ) -> None:
-    model = system(name)
+    model = MODELS[name]
     uncertainty = model.uncertainty
     assert uncertainty is not None
     z = model.lower + known * (model.upper - model.lower)

@@ -199,18 +199,29 @@ class DescriptorSystem:
         """The matrices at a premise vector z of shape (p,)."""
         return SystemMatrices(self.E.evaluate(z), self.A.evaluate(z), self.B.evaluate(z), self.C.evaluate(z))
 
-    def premise_values(self, x: ArrayLike) -> NDArray[np.float64]:
-        """z(x), shape (p,), at a state of shape (q,).
+    def premise_values(self, x: ArrayLike, parameters: Mapping[sp.Symbol, float] | None = None) -> NDArray[np.float64]:
+        """z(x), shape (p,), at a state of shape (n,) and at values of the uncertain parameters, if there are any.
 
         Raises:
-            InputError: a premise depends on something that is not a state (an uncertain parameter).
+            InputError: a premise depends on a parameter that has no value.
         """
-        return np.array(self._premise_function(*np.asarray(x, dtype=float)), dtype=float)
+        parameters, values = parameters or {}, np.asarray(x, dtype=float)
+        if values.shape != (self.order,):
+            raise InputError(self.name, "x", f"shape {values.shape}", f"shape ({self.order},)")
+        missing = [symbol.name for symbol in self.parameters if symbol not in parameters]
+        if missing:
+            expected = "a value of every parameter the premises depend on"
+            raise InputError(self.name, "parameters", f"none for {', '.join(missing)}", expected)
+        return np.array(
+            self._premise_function(*values, *(parameters[symbol] for symbol in self.parameters)), dtype=float
+        )
+
+    @cached_property
+    def parameters(self) -> tuple[sp.Symbol, ...]:
+        """The symbols other than states that the premises depend on, by name."""
+        symbols = {symbol for premise in self.premises for symbol in premise.expression.free_symbols}
+        return tuple(sorted(symbols - set(self.state), key=lambda symbol: symbol.name))
 
     @cached_property
     def _premise_function(self) -> Any:
-        for premise in self.premises:
-            others = premise.expression.free_symbols - set(self.state)
-            if others:
-                raise InputError(self.name, f"premise {premise.name}", f"parameters {others}", "states only")
-        return sp.lambdify(self.state, [premise.expression for premise in self.premises], "numpy")
+        return sp.lambdify((*self.state, *self.parameters), [p.expression for p in self.premises], "numpy")

@@ -54,6 +54,9 @@ def equation_matrices(
     if len(equations) != len(state):
         raise InputError(source, "equations", f"{len(equations)} equations", f"{len(state)}, one for each state")
     residuals = [e.lhs - e.rhs if isinstance(e, sp.Eq) else sp.sympify(e) for e in equations]
+    for number, residual in enumerate(residuals, 1):
+        if not isinstance(residual, sp.Expr):  # sympy evaluates an equation without unknowns to true or false
+            raise InputError(source, f"equation {number}", residual, "an expression or an equation with unknowns")
     rates = [rate(symbol) for symbol in state]
     E = sp.Matrix([_slopes(f"{source}: equation {k}", r, rates, inputs) for k, r in enumerate(residuals, 1)])
     B = -sp.Matrix([_slopes(f"{source}: equation {k}", r, inputs, rates) for k, r in enumerate(residuals, 1)])

@@ -76,9 +76,14 @@ def _kind(term: sp.Expr, unknown: Collection[sp.Symbol]) -> PremiseKind:
 
 
 def _readable(vector: Expansion) -> sp.Expr:
-    """The premise with common factors taken out, so that symbols occur as seldom as they can."""
+    """The premise written so that symbols occur seldom, once at best: the sooner its range is found."""
     short = {term: c if c.q < 10**6 else sp.Float(float(c)) for term, c in vector.items()}
-    return sp.factor_terms(summed(short))
+    whole = summed(short)
+    return min(sp.factor_terms(whole), sp.factor(whole), key=_symbol_count)
+
+
+def _symbol_count(expression: sp.Expr) -> int:
+    return sum(isinstance(node, sp.Symbol) for node in sp.preorder_traversal(expression))
 
 
 def _reduced_basis(vectors: Iterable[Expansion], order: Sequence[sp.Expr]) -> dict[sp.Expr, Expansion]:
