@@ -8,6 +8,7 @@ import sympy as sp
 
 from quasilpv.systems.catalogue import SYSTEMS, system
 from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.premise import Premise
 from quasilpv.systems.structure import Standing, StructureVerdict, structure_report
 
 x, y, w = sp.symbols("x y w", real=True)
@@ -95,3 +96,18 @@ def test_inertia_of_arm3_is_invertible_at_every_posture_but_not_at_every_corner_
     corners = [model.evaluate(np.where(bits, model.upper, model.lower)).E for bits in product([0, 1], repeat=12)]
     determinants = np.linalg.det(np.array(corners))
     assert determinants.min() < 0 < determinants.max()
+
+
+def test_when_the_domain_is_not_stated_expect_the_box_to_decide() -> None:
+    model = DescriptorSystem.from_symbols(
+        name="toy",
+        state=(x,),
+        inputs=(),
+        E=sp.Matrix([[w]]),
+        A=sp.eye(1),
+        B=sp.zeros(1, 0),
+        C=sp.eye(1),
+        premises=[Premise("z1", w, (-1.0, 1.0))],
+        domain={},
+    )
+    assert structure_report(model).leading.standing is Standing.REFUTED

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import product
-from math import isfinite
 
 import numpy as np
 import sympy as sp
@@ -153,7 +152,9 @@ def _invertible(system: DescriptorSystem, name: str, matrix: AffineMatrix, block
     finding = _nonzero_over_box(f"det {name}", determinant, box)
     if finding.holds:
         return finding
-    of_state = determinant.subs({symbol: p.expression for symbol, p in zip(z, system.premises, strict=True)})
+    of_state = determinant.subs(
+        {symbol: _without_floats(p.expression) for symbol, p in zip(z, system.premises, strict=True)}
+    )
     try:
         low, high = _sign_range(of_state, system.domain)
     except InputError:  # no range: unbounded, or unbounded domain
@@ -165,6 +166,11 @@ def _invertible(system: DescriptorSystem, name: str, matrix: AffineMatrix, block
 
 def _exact(matrix: NDArray[np.float64]) -> sp.Matrix:
     return sp.Matrix(*matrix.shape, [sp.Rational(float(entry)) for entry in matrix.flat])
+
+
+def _without_floats(expression: sp.Expr) -> sp.Expr:
+    """The expression with its floats as the rationals they are, which products do not round."""
+    return expression.xreplace({number: sp.Rational(number) for number in expression.atoms(sp.Float)})
 
 
 def _nonzero_over_box(name: str, determinant: sp.Expr, box: Mapping[sp.Symbol, Interval]) -> Finding:
@@ -189,12 +195,12 @@ def _nonzero_over_box(name: str, determinant: sp.Expr, box: Mapping[sp.Symbol, I
 
 def _sign_range(expression: sp.Expr, domain: Mapping[sp.Symbol, Interval]) -> Interval:
     """Guaranteed range, tight enough for a sign unless the expression is small against its value in the middle."""
-    middle = {symbol: 0.5 * (domain[symbol][0] + domain[symbol][1]) for symbol in expression.free_symbols}
-    size = abs(float(expression.subs(middle)))
-    scale = size if isfinite(size) and size > 0 else 1.0
+    middle = {symbol: 0.5 * (low + high) for symbol, (low, high) in domain.items()}
+    size = abs(expression.subs(middle))
+    scale = sp.Rational(size) if size.is_finite and size.is_positive else sp.S.One
     low, high = -1.0, 1.0
     for tolerance in _SIGN_TOLERANCES:
         low, high = enclose(expression / scale, domain, tolerance)
         if not low <= 0 <= high:
             break
-    return low * scale, high * scale
+    return low * float(scale), high * float(scale)
