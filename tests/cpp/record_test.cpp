@@ -23,7 +23,9 @@ TEST(Record, csv_heads_single_columns_by_name_and_joint_columns_by_index) {
   record.append(time, 0.001);
   record.append(angle, {1.0, 2.0});
   std::ostringstream out;
-  record.write_csv(out);
+  CsvWriter csv(out);
+  record.write_csv(csv);
+  EXPECT_TRUE(csv.close());
   EXPECT_EQ(out.str(), "time_s,angle_rad_0,angle_rad_1\n0,0.5,-0.25\n0.001,1,2\n");
 }
 
@@ -41,7 +43,8 @@ TEST(Record, csv_numbers_read_back_as_the_same_doubles) {
     record.append(column, value);
   }
   std::stringstream file;
-  record.write_csv(file);
+  CsvWriter csv(file);
+  record.write_csv(csv);
   std::string line;
   std::getline(file, line);
   for (const double value : values) {
@@ -65,8 +68,9 @@ TEST(Record, when_columns_differ_in_length_expect_refusal_naming_the_column) {
   record.append(record.add_column("time_s"), 0.0);
   record.add_column("angle_rad", 2);
   std::ostringstream out;
+  CsvWriter csv(out);
   try {
-    record.write_csv(out);
+    record.write_csv(csv);
     FAIL() << "written";
   } catch (const InputError& error) {
     EXPECT_EQ(error.field(), "angle_rad");

@@ -84,7 +84,8 @@ double largest_difference(const RunRecord& a, const RunRecord& b, const std::str
 
 std::string csv(const RunRecord& run) {
   std::ostringstream out;
-  run.samples.write_csv(out);
+  CsvWriter writer(out);
+  run.samples.write_csv(writer);
   return out.str();
 }
 

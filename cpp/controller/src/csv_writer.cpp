@@ -19,7 +19,7 @@ void append_number(std::string& row, Number value) {
 
 }  // namespace
 
-CsvWriter::CsvWriter(const std::string& path) : file_(path, std::ios::binary | std::ios::trunc) {
+CsvWriter::CsvWriter(const std::string& path) : file_(path, std::ios::binary | std::ios::trunc), out_(file_) {
   if (!file_) {
     throw InputError(path, "record", std::strerror(errno), "a file that can be written");
   }
@@ -50,13 +50,17 @@ void CsvWriter::add(const double* values, int count) {
 
 bool CsvWriter::end_row() {
   row_ += '\n';
-  file_.write(row_.data(), static_cast<std::streamsize>(row_.size()));
+  out_.write(row_.data(), static_cast<std::streamsize>(row_.size()));
   row_.clear();
-  return file_.good();
+  return out_.good();
 }
 
 bool CsvWriter::close() {
-  const bool healthy = file_.good();
+  out_.flush();
+  const bool healthy = out_.good();
+  if (!file_.is_open()) {
+    return healthy;
+  }
   file_.close();
   return healthy && file_.good();
 }

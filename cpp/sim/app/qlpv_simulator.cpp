@@ -1,10 +1,11 @@
 // qlpv-simulator: the plant of one scenario, one run over LCM. Contract: docs/reference/messages.md
-#include <fstream>
 #include <iostream>
+#include <memory>
 #include <string>
 
 #include "quasilpv/artifact.hpp"
 #include "quasilpv/command_line.hpp"
+#include "quasilpv/csv_writer.hpp"
 #include "quasilpv/lcm_link.hpp"
 #include "quasilpv/plant_loop.hpp"
 #include "quasilpv/run_report.hpp"
@@ -58,33 +59,27 @@ Json describe(const PlantRunReport& run, const LinkCounters& counters, bool real
 /// The record of a run, created before it starts so that a bad path costs nothing.
 class RecordFile {
  public:
-  explicit RecordFile(const std::string& path) : path_(path) {
-    if (!path_.empty()) {
-      file_.open(path_, std::ios::binary | std::ios::trunc);
-      require_good("a file that can be created");
-    }
-  }
+  /// Throws InputError if the file cannot be created.
+  explicit RecordFile(const std::string& path)
+      : path_(path), file_(path.empty() ? nullptr : std::make_unique<CsvWriter>(path)) {}
 
   /// Where the run records, null without a path.
-  Record* record() { return path_.empty() ? nullptr : &record_; }
+  Record* record() { return file_ == nullptr ? nullptr : &record_; }
 
+  /// Throws InputError if not all of it could be written.
   void write() {
-    if (!path_.empty()) {
-      record_.write_csv(file_);
-      file_.close();
-      require_good("room for the whole record");
+    if (file_ == nullptr) {
+      return;
+    }
+    record_.write_csv(*file_);
+    if (!file_->close()) {
+      throw InputError(path_, "record", "a write error", "room for the whole record");
     }
   }
 
  private:
-  void require_good(const char* expected) const {
-    if (!file_) {
-      throw InputError(path_, "record", "a write error", expected);
-    }
-  }
-
   std::string path_;
-  std::ofstream file_;
+  std::unique_ptr<CsvWriter> file_;
   Record record_;
 };
 

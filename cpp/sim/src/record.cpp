@@ -1,46 +1,9 @@
 #include "quasilpv/record.hpp"
 
-#include <array>
-#include <charconv>
-#include <ostream>
-
+#include "quasilpv/csv_writer.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {
-namespace {
-
-void write_header(std::ostream& out, const std::vector<Record::Column>& columns) {
-  const char* separator = "";
-  for (const Record::Column& column : columns) {
-    for (std::size_t i = 0; i < column.width; ++i) {
-      out << separator << column.name;
-      if (column.width > 1) {
-        out << '_' << i;
-      }
-      separator = ",";
-    }
-  }
-  out << '\n';
-}
-
-void write_sample(std::ostream& out, const std::vector<Record::Column>& columns, std::size_t sample) {
-  std::array<char, 32> digits{};
-  const char* separator = "";
-  for (const Record::Column& column : columns) {
-    for (std::size_t i = 0; i < column.width; ++i) {
-      const double value = column.values[sample * column.width + i];
-      const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value);
-      static_cast<void>(error);  // the longest shortest double has 24 characters
-      out << separator;
-      out.write(digits.data(), end - digits.data());
-      separator = ",";
-    }
-  }
-  out << '\n';
-}
-
-}  // namespace
-
 std::size_t Record::add_column(const std::string& name, std::size_t width) {
   for (const Column& column : columns_) {
     if (column.name == name) {
@@ -74,7 +37,7 @@ const Record::Column& Record::operator[](const std::string& name) const {
   throw InputError("record", name, "no such column", "one that was added");
 }
 
-void Record::write_csv(std::ostream& out) const {
+void Record::write_csv(CsvWriter& csv) const {
   const std::size_t samples = columns_.empty() ? 0 : columns_.front().samples();
   for (const Column& column : columns_) {
     if (column.values.size() != samples * column.width) {
@@ -82,9 +45,15 @@ void Record::write_csv(std::ostream& out) const {
                        std::to_string(samples * column.width));
     }
   }
-  write_header(out, columns_);
+  for (const Column& column : columns_) {
+    csv.head(column.name, static_cast<int>(column.width));
+  }
+  csv.end_row();
   for (std::size_t sample = 0; sample < samples; ++sample) {
-    write_sample(out, columns_, sample);
+    for (const Column& column : columns_) {
+      csv.add(column.values.data() + sample * column.width, static_cast<int>(column.width));
+    }
+    csv.end_row();
   }
 }
 

@@ -1,18 +1,23 @@
-// Rows of exact numbers into a file, one after the other.
+// Rows of exact numbers into a file or stream, one after the other.
 #pragma once
 
 #include <cstdint>
 #include <fstream>
+#include <ostream>
 #include <string>
 
 namespace quasilpv {
 
-/// Writes a CSV file row by row; numbers are the shortest decimals that read back as the same value, so equal runs give
+/// Writes CSV row by row; numbers are the shortest decimals that read back as the same value, so equal runs give
 /// equal files. A full disk is an outcome, not an exception. RT-UNSAFE.
 class CsvWriter {
  public:
   /// Throws InputError if the file cannot be created.
   explicit CsvWriter(const std::string& path);
+  /// Writes to a stream that outlives this.
+  explicit CsvWriter(std::ostream& out) : out_(out) {}
+  CsvWriter(const CsvWriter&) = delete;
+  CsvWriter& operator=(const CsvWriter&) = delete;
 
   /// Heads `width` columns: `name`, or `name_0`, `name_1`, ... if width is above 1.
   void head(const std::string& name, int width = 1);
@@ -24,13 +29,14 @@ class CsvWriter {
   /// Ends the header or a row. Returns false if it, or an earlier one, could not be written.
   bool end_row();
 
-  /// Flushes and closes; false if anything was lost.
+  /// Flushes, and closes the file; false if anything was lost.
   bool close();
 
  private:
   void separate();
 
   std::ofstream file_;
+  std::ostream& out_;
   std::string row_;
 };
 

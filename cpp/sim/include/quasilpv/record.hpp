@@ -2,10 +2,10 @@
 #pragma once
 
 #include <cstddef>
-#include <iosfwd>
 #include <string>
 #include <vector>
 
+#include "quasilpv/csv_writer.hpp"
 #include "quasilpv/step.hpp"
 
 namespace quasilpv {
@@ -38,9 +38,9 @@ class Record {
   const Column& operator[](const std::string& name) const;
 
   /// One header line, then one line per sample. A column of width 1 is headed by its name, the entries of a wider one
-  /// by `name_0`, `name_1`, ... Numbers are the shortest decimals that read back as the same doubles (std::to_chars),
-  /// so equal runs are equal files. Throws InputError if the columns differ in length.
-  void write_csv(std::ostream& out) const;
+  /// by `name_0`, `name_1`, ... Whether all of it could be written, the writer knows. Throws InputError if the columns
+  /// differ in length.
+  void write_csv(CsvWriter& csv) const;
 
  private:
   std::vector<Column> columns_;
