@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import isfinite
@@ -48,6 +48,7 @@ class Options:
     decay_rate: float = 0.0
     form: Form = Form.REDUCED
     window_s: float | None = None
+    common: bool = False
 
     def __post_init__(self) -> None:
         """Refuse numbers without a meaning."""
@@ -65,10 +66,25 @@ class Feedback:
         lyapunov: P with ``V = x_d' P^-1 x_d`` on the differential states, (q, q).
         gain: ``z -> K(z)``, (m, n) for ``u = K(z) x``, or (m, n + q) for ``u = K(z) (x_d, x_d', x_a)``; None for an
             analysis condition.
+        delayed: the law with memory that was designed, if it has one; `gain` is then the law without that follows.
     """
 
     lyapunov: FloatArray
     gain: Callable[[FloatArray], FloatArray] | None
+    delayed: DelayedFeedback | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class DelayedFeedback:
+    """A law with memory: it knows the mean of the weights over the last tau seconds, and those tau seconds ago.
+
+    Attributes:
+        lyapunov: from the mean weights (N,) to P with ``V = x_d' P^-1 x_d``.
+        gain: from z now, the mean weights and z tau seconds ago to K with ``u = K x``.
+    """
+
+    lyapunov: Callable[[FloatArray], FloatArray]
+    gain: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,3 +147,50 @@ def shared_gains(model: PolytopicModel, columns: int, name: str = "F") -> tuple[
     representative = model.polytope.shared_gain
     own = {vertex: Variable(f"{name}{vertex}", model.inputs, columns) for vertex in sorted(set(representative))}
     return tuple(own[vertex] for vertex in representative)
+
+
+def polytopic_gain(
+    model: PolytopicModel, F: Sequence[Variable], values: Values, right: FloatArray
+) -> Callable[[FloatArray], FloatArray] | None:
+    """``z -> sum_i w_i(z) F_i right``, or None for a system without inputs.
+
+    Args:
+        model: the system.
+        F: gain unknown of every vertex.
+        values: of the unknowns.
+        right: constant factor.
+    """
+    if model.inputs == 0:
+        return None
+    vertices = np.stack([values[Fi] for Fi in F]) @ right
+    return lambda z: np.asarray(model.polytope.evaluate(vertices, z))
+
+
+def on_state(lyapunov: FloatArray, order: int) -> FloatArray:
+    """``[P^-1 0]``, (q, n): what a gain on ``P^-1 x_d`` is multiplied with to act on x."""
+    inverse = np.linalg.inv(lyapunov)
+    return np.hstack([inverse, np.zeros((len(inverse), order - len(inverse)))])
+
+
+def single_sum_blocks(model: PolytopicModel, slack: Slack) -> npt.NDArray[np.intp] | None:
+    """Blocks of the vertices for the slack of a single sum, in which all families are the same; None for none."""
+    return None if slack is Slack.NONE else model.polytope.block_index
+
+
+def descriptor_feedback(model: PolytopicModel, P: Variable, F: Sequence[Variable]) -> Callable[[Values], Feedback]:
+    """From a solution to the law ``u = F(z) E(z)^-T P^-1 x`` with vertex unknowns F_j (m, n)."""
+
+    def feedback(values: Values) -> Feedback:
+        return descriptor_law(model, values[P], np.stack([values[Fj] for Fj in F]))
+
+    return feedback
+
+
+def descriptor_law(model: PolytopicModel, lyapunov: FloatArray, gains: FloatArray) -> Feedback:
+    """The law ``u = F(z) E(z)^-T P^-1 x``, P (n, n) and vertices of F (count, m, n)."""
+    inverse = np.linalg.inv(lyapunov)
+
+    def gain(z: FloatArray) -> FloatArray:
+        return np.asarray(model.polytope.evaluate(gains, z) @ np.linalg.solve(model.system.E.evaluate(z).T, inverse))
+
+    return Feedback(lyapunov, gain if model.inputs else None)

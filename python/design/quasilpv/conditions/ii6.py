@@ -6,27 +6,27 @@ that the inequality is quadratic in the weights:
 
     He [A_i L_j + B_i F_j, A_i R_j; P E_i' - L_j, -R_j] + slack < 0    for all sums over i, j
 
-(A_i stands for A_i + alpha E_i.) The printed slack sums over the wrong index; here they have mean zero.
+(A_i stands for A_i + alpha E_i.) The printed slack sums run over the wrong index; here they have mean zero.
+
+Reduced form: the closed form of `matched` for systems like robots, whose premises act only where the inputs do.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
 
-import numpy as np
-
+from quasilpv.conditions import matched
 from quasilpv.conditions.blocks import double_sum
 from quasilpv.conditions.condition import (
     Condition,
-    Feedback,
-    FloatArray,
+    Form,
     Options,
     Statement,
-    Values,
+    descriptor_feedback,
     require_regular,
     shared_gains,
 )
-from quasilpv.lmi import Expression, Problem, Variable, block, he
+from quasilpv.lmi import Expression, Problem, Variable, block
 from quasilpv.polytopes import PolytopicModel
 
 
@@ -39,31 +39,25 @@ def build(model: PolytopicModel, options: Options) -> Statement:
         InputError: the system has algebraic states.
     """
     require_regular(model, "II.6")
+    if options.form is Form.REDUCED and matched.applies(model):
+        return matched.build(model, options)
     n, count = model.order, model.vertex_count
     P = Variable("P", n, symmetric=True)
-    L, R = ([Variable(f"{name}{j}", n) for j in range(count)] for name in "LR")
+    labels = [""] * count if options.common else [str(j) for j in range(count)]
+    unknowns = {label: (Variable(f"L{label}", n), Variable(f"R{label}", n)) for label in labels}
     F = shared_gains(model, n)
     alpha = Fraction(options.decay_rate)
 
     def entry(i: int, j: int) -> Expression:
         A = model.A[i] + model.E[i] * alpha
-        return he(block([[A @ L[j] + model.B[i] @ F[j], A @ R[j]], [P @ model.E[i].T - L[j], -R[j]]]))
+        L, R = unknowns[labels[j]]
+        return block([[A @ L + model.B[i] @ F[j], A @ R], [P @ model.E[i].T - L, -R]])
 
     problem = Problem()
     problem.positive("P", P)
     slacks = double_sum(problem, "Xi", entry, count, model.polytope.block_index, slack=options.slack)
 
-    def feedback(values: Values) -> Feedback:
-        inverse = np.linalg.inv(values[P])
-
-        def gain(z: FloatArray) -> FloatArray:
-            F_z = model.polytope.evaluate(np.stack([values[Fj] for Fj in F]), z)
-            E_z = model.system.E.evaluate(z)
-            return np.asarray(F_z @ np.linalg.solve(E_z.T, inverse))
-
-        return Feedback(values[P], gain)
-
-    return Statement(problem, feedback, slacks)
+    return Statement(problem, descriptor_feedback(model, P, F), slacks)
 
 
 CONDITION = Condition(

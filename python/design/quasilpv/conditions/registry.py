@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
-from quasilpv.conditions import ii6
+from quasilpv.conditions import guerra2007, i1, i2, i3, i53, ii5, ii6, ii6_direct, iii9, tanaka_wang, ts_pj
 from quasilpv.conditions.condition import Condition
 from quasilpv.errors import InputError
 
-CONDITIONS: dict[str, Condition] = {entry.id: entry for entry in (ii6.CONDITION,)}
+CONDITIONS: dict[str, Condition] = {
+    entry.id: entry
+    for entry in (
+        i1.CONDITION,
+        i2.CONDITION,
+        i53.CONDITION,
+        i3.CONDITION,
+        ii5.CONDITION,
+        ii5.COROLLARY,
+        ii6.CONDITION,
+        ii6_direct.CONDITION,
+        iii9.CONDITION,
+        ts_pj.CONDITION,
+        guerra2007.CONDITION,
+        tanaka_wang.CONDITION,
+    )
+}
 
 
 def condition(name: str) -> Condition:

@@ -58,7 +58,41 @@ def is_positive_definite(matrix: Matrix) -> bool:
         raise ValueError(f"expected a symmetric matrix, got shape {work.shape}")
     if any(work[k, k] <= 0 for k in range(size)):
         return False
-    return has_positive_minors(_integer_rows(work))
+    return is_positive_triangle(_integer_rows(work))
+
+
+def is_positive_triangle(rows: list[list[int]]) -> bool:
+    """Whether a symmetric integer matrix is positive definite, decided without rounding.
+
+    The minors of long integers are expensive, so that short ones are tried first. With S a diagonal of powers of two
+    that brings the diagonal of ``S M S`` near ``2^SHORT_BITS``, its entries are cut to whole numbers. What is cut off is
+    a matrix of n x n entries below 1, of norm below n: ``cut(S M S) - n I > 0`` proves M > 0, and M > 0 implies
+    ``cut(S M S) + n I > 0``.
+
+    Args:
+        rows: of the upper triangle, the diagonal entry first.
+    """
+    if any(row[0] <= 0 for row in rows):
+        return False
+    scale = [row[0].bit_length() // 2 for row in rows]
+    cut = [
+        [_shifted(entry, SHORT_BITS - scale[i] - scale[i + k]) for k, entry in enumerate(row)]
+        for i, row in enumerate(rows)
+    ]
+    if has_positive_minors([[row[0] - len(rows), *row[1:]] for row in cut]):
+        return True
+    if not has_positive_minors([[row[0] + len(rows), *row[1:]] for row in cut]):
+        return False
+    return has_positive_minors([list(row) for row in rows])
+
+
+SHORT_BITS = 64
+"""Length of the integers of the short proof; it decides nothing about matrices singular to about as many bits."""
+
+
+def _shifted(entry: int, bits: int) -> int:
+    """``entry * 2^bits`` rounded down."""
+    return entry << bits if bits >= 0 else entry >> -bits
 
 
 def has_positive_minors(rows: list[list[int]]) -> bool:
@@ -80,6 +114,49 @@ def has_positive_minors(rows: list[list[int]]) -> bool:
             below[:] = [(pivot * m - factor * r) // previous for m, r in zip(below, row[i:], strict=True)]
         previous = pivot
     return True
+
+
+def rank_factors(matrix: Matrix) -> tuple[Matrix, Matrix]:
+    """``X = U V`` with U (rows, k) and V (k, columns) of full rank k, exact.
+
+    Args:
+        matrix: array of `fractions.Fraction` or int.
+    """
+    reduced, pivots = _row_echelon(matrix)
+    return to_rational(matrix)[:, pivots], reduced[: len(pivots)]
+
+
+def null_space(matrix: Matrix) -> Matrix:
+    """Basis N of the vectors with ``X N = 0`` as columns, (columns, columns - k), exact.
+
+    Args:
+        matrix: array of `fractions.Fraction` or int, of rank k.
+    """
+    reduced, pivots = _row_echelon(matrix)
+    free = [column for column in range(matrix.shape[1]) if column not in pivots]
+    basis = to_rational(np.zeros((matrix.shape[1], len(free)), dtype=int))
+    basis[free, range(len(free))] = Fraction(1)
+    basis[pivots, :] = -reduced[: len(pivots), free]
+    return basis
+
+
+def _row_echelon(matrix: Matrix) -> tuple[Matrix, list[int]]:
+    """Reduced row echelon form, and the columns of its leading ones."""
+    rows = to_rational(matrix)
+    pivots: list[int] = []
+    for column in range(rows.shape[1]):
+        rank = len(pivots)
+        candidates = np.flatnonzero(rows[rank:, column])
+        if not candidates.size:
+            continue
+        pivot = rank + int(candidates[0])
+        rows[[rank, pivot]] = rows[[pivot, rank]]
+        rows[rank] = rows[rank] / rows[rank, column]
+        for other in np.flatnonzero(rows[:, column]):
+            if other != rank:
+                rows[other] = rows[other] - rows[other, column] * rows[rank]
+        pivots.append(column)
+    return rows, pivots
 
 
 def _integer_rows(matrix: Matrix) -> list[list[int]]:

@@ -131,6 +131,20 @@ class BlockPolytope:
         r = np.size(lower)
         return cls.from_blocks(lower, upper, [Block("simplex" if r else "box", tuple(range(r)))], unknown=unknown)
 
+    def restricted(self, premises: Sequence[int]) -> BlockPolytope:
+        """The same blocks on some of the premises, in ascending order; blocks that lose all of theirs are left out."""
+        kept = sorted(premises)
+        place = {p: index for index, p in enumerate(kept)}
+        remaining = [tuple(place[p] for p in block.premises if p in place) for block in self.blocks]
+        blocks = [Block(own.kind, left) for own, left in zip(self.blocks, remaining, strict=True) if left]
+        return BlockPolytope.from_blocks(
+            self.lower[kept],
+            self.upper[kept],
+            blocks or [Block("box", ())],
+            centre=self.centre[kept],
+            unknown=[place[p] for p in self.unknown if p in place],
+        )
+
     # ---- sizes and indices -----------------------------------------------------------------------------------------
 
     @property

@@ -21,6 +21,9 @@ ExactMatrix: TypeAlias = npt.NDArray[Any]
 
 Vertices: TypeAlias = tuple[ExactMatrix, ...]
 
+MatrixFunction: TypeAlias = Callable[[ExactMatrix, ExactMatrix, ExactMatrix], ExactMatrix]
+"""From exact (E, A, B) to an exact matrix."""
+
 
 @dataclass(frozen=True, eq=False)
 class PolytopicModel:
@@ -97,26 +100,41 @@ class PolytopicModel:
         """Whether E does not depend on the premises."""
         return not self.system.E.coefficients.any()
 
-    def vertices(self, function: Callable[[ExactMatrix, ExactMatrix, ExactMatrix], ExactMatrix]) -> Vertices:
+    def vertices(self, function: MatrixFunction) -> Vertices:
         """Vertices of an affine function of (E, A, B), exact.
 
         Vertices that differ only in premises the function does not depend on are one and the same object: of the 4096
         vertices of a function of three premises, eight are computed.
-
-        Args:
-            function: from exact (E, A, B) to an exact matrix.
         """
-        origin = function(*(np.zeros(X.shape, dtype=int).astype(object) for X in self._constants))
-        slopes = {p: function(*X) - origin for p, X in self._slopes.items()}
-        slopes = {p: slope for p, slope in slopes.items() if slope.any()}
+        constant, slopes = self._affine(function)
         first = self.polytope.equal_vertices(list(slopes))
         distinct = np.unique(first).tolist()
-        constant = function(*self._constants)
         values = {
             vertex: sum((offsets[p] * slope for p, slope in slopes.items()), constant)
             for vertex, offsets in zip(distinct, self.polytope.exact_offsets(distinct), strict=True)
         }
         return tuple(values[vertex] for vertex in first.tolist())
+
+    def premises_of(self, function: MatrixFunction) -> list[int]:
+        """The premises on which an affine function of (E, A, B) depends, ascending."""
+        return sorted(self._affine(function)[1])
+
+    def spread(self, function: MatrixFunction) -> tuple[ExactMatrix, dict[int, ExactMatrix]]:
+        """An affine function of (E, A, B) over the box, exact: ``X_c + sum_p d_p X_p`` with ``-1 <= d_p <= 1``.
+
+        Returns:
+            X_c, its value at the centre of the box, and the X_p that are not zero by premise.
+        """
+        constant, slopes = self._affine(function)
+        bounds = {p: (Fraction(self.polytope.lower[p]), Fraction(self.polytope.upper[p])) for p in slopes}
+        centre = sum(((low + high) / 2 * slopes[p] for p, (low, high) in bounds.items()), constant)
+        return centre, {p: (high - low) / 2 * slopes[p] for p, (low, high) in bounds.items()}
+
+    def _affine(self, function: MatrixFunction) -> tuple[ExactMatrix, dict[int, ExactMatrix]]:
+        """Value at z = 0 and coefficients of the premises on which a function depends."""
+        origin = function(*(np.zeros(X.shape, dtype=int).astype(object) for X in self._constants))
+        slopes = {p: function(*X) - origin for p, X in self._slopes.items()}
+        return function(*self._constants), {p: slope for p, slope in slopes.items() if slope.any()}
 
     @cached_property
     def _constants(self) -> tuple[ExactMatrix, ExactMatrix, ExactMatrix]:

@@ -1,0 +1,77 @@
+"""Law (I.53): extended parallel distributed compensation, ``u = sum_j w_j(z) K_j x_e`` with ``x_e = (x_d, x_d', x_a)``.
+
+Theorem I.2 with full gain unknowns: ``sum_ij w_i w_j He((A_i + alpha E_o) P + B_i M_j) < 0``, M_j (m, N), and
+``K(z) = M(z) P^-1``. The controller needs the derivatives of the differential states.
+
+Reduced form, B constant and no slack or a single block: without the gains (`elimination`). For a robot, ``B = [0; I]``,
+no premise is left: the law exists whatever friction, inertia and bounds are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from quasilpv.conditions.blocks import double_sum
+from quasilpv.conditions.condition import (
+    Condition,
+    Feedback,
+    Form,
+    Options,
+    Statement,
+    Values,
+    polytopic_gain,
+    shared_gains,
+)
+from quasilpv.conditions.elimination import gains_are_free, gains_on_extended, unactuated_rows
+from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states
+from quasilpv.conditions.slack import Slack
+from quasilpv.lmi import Expression, Problem, Variable
+from quasilpv.lmi.expressions import as_expression
+from quasilpv.polytopes import PolytopicModel
+
+
+def build(model: PolytopicModel, options: Options) -> Statement:
+    """State the condition.
+
+    Unknowns ``P_11 = P_11' > 0`` (q, q), P_21 (n, q), P_22 (n, n) and M_j (m, N) per vertex.
+    """
+    q, n, count = model.differential, model.order, model.vertex_count
+    P11, P21, P22 = Variable("P11", q, symmetric=True), Variable("P21", n, q), Variable("P22", n)
+    P = extended_lyapunov(P11, P21, P22)
+    problem = Problem()
+    problem.positive("P11", P11)
+    slackless = len(model.polytope.blocks) == 1 or options.slack is Slack.NONE
+    if options.form is Form.REDUCED and slackless and gains_are_free(model) and model.inputs:
+        unactuated_rows(problem, model, P, options.decay_rate)
+
+        def recovered(values: Values) -> Feedback:
+            extended = np.stack(extended_states(model, options.decay_rate)).astype(float)
+            value = P.at(values).astype(float)
+            M = gains_on_extended(extended, extended_inputs(model)[0].astype(float), value)
+            K = M @ np.linalg.inv(value)
+            return Feedback(values[P11], lambda z: np.asarray(model.polytope.evaluate(K, z)))
+
+        return Statement(problem, recovered)
+
+    M = shared_gains(model, q + n, "M")
+    A, B = extended_states(model, options.decay_rate), extended_inputs(model)
+
+    def entry(i: int, j: int) -> Expression:
+        return as_expression(A[i] @ P + B[i] @ M[j])
+
+    slacks = double_sum(problem, "Upsilon", entry, count, model.polytope.block_index, slack=options.slack)
+
+    def feedback(values: Values) -> Feedback:
+        inverse = np.linalg.inv(P.at(values).astype(float))
+        return Feedback(values[P11], polytopic_gain(model, M, values, inverse))
+
+    return Statement(problem, feedback, slacks)
+
+
+CONDITION = Condition(
+    id="I.53",
+    summary="extended compensation K(z) (x_d, x_d', x_a), needs derivatives of the states",
+    reference="Dehak 2022, (I.53) with Theorem I.2",
+    representation="reduced",
+    build=build,
+)
