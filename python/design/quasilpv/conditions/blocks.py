@@ -101,15 +101,16 @@ def double_sum(
     """
     size = entry(*(0,) * (2 + others)).shape[0]
     shift = slack_family(slack, name, slack_blocks, size, sums=2 + others)
+    own = Fraction(2, max(count - 1, 1))
     for rest in product(range(count), repeat=others):
         grid = [[entry(i, j, *rest) for j in range(count)] for i in range(count)]
         label = " ".join(map(str, rest))
         for i in range(count):
             problem.negative(f"{name} {i} {i} {label}".rstrip(), grid[i][i] + shift.at((i, i, *rest)))
+            diagonal = grid[i][i] * own
             for j in range(count):
                 if i != j:
-                    own = Fraction(2, count - 1)
                     added = shift.sum({(i, i, *rest): own, (i, j, *rest): Fraction(1), (j, i, *rest): Fraction(1)})
-                    tuan = grid[i][i] * own + grid[i][j] + grid[j][i]
+                    tuan = diagonal + grid[i][j] + grid[j][i]
                     problem.negative(f"{name} {i} {j} {label}".rstrip(), tuan + added)
     return shift.variables

@@ -6,16 +6,20 @@ Let B be constant with full column rank and ``N' B = 0``, and let ``N' E`` and `
 
     N' He((A + alpha E) P E') N < 0,    P = P' > 0,
 
-one inequality without premises. It is necessary because ``N' (He[(A + alpha E) P E' + B F]) N`` is its left side at every
-z. It is sufficient: in the rows ``T' = [N, B (B'B)^-1]'`` write A~ = T' (A + alpha E), E~ = T' E, ``T' B = [0; I]``, and
+one inequality without premises. It is necessary because ``N' He[(A + alpha E) P E' + B F] N`` is its left side at
+every z. It is sufficient: in the rows ``T' = [N, B (B'B)^-1]'`` write A~ = T' (A + alpha E), E~ = T' E, T' B = [0; I],
+t and b for the upper and lower rows, and
 
-    C_i = P E~_i' + rho A~_i' = [C_1, C_2i],    L = [C_1, L_2],  R = rho I,  L_2 the mean of the C_2i,
-    F~_i = [-A~_bi L_1 - (A~_t L_2)',  -A~_bi L_2 - ((C_2i - L_2)' (C_2i - L_2) / (2 rho) + eta I) / 2],    F_i = F~_i T^-1,
+    C_i = P E~_i' + rho A~_i' = [C_1, C_2i],    L = [C_1, L_2],    R = rho I,    L_2 the mean of the C_2i,
+    F_i = [-A~_bi C_1 - (A~_t L_2)',  -A~_bi L_2 - ((C_2i - L_2)' (C_2i - L_2) / (2 rho) + eta I) / 2] T^-1.
 
-t and b marking the upper and lower rows. Schur's complement of -2 rho I leaves ``diag(He(A~_t P E~_t') + 2 rho A~_t A~_t',
--eta I)``, negative for small rho > 0. For a robot and ``P = [p_1 I, -p_2 I; -p_2 I, p_3 I]`` the first block is
-``-2 (p_2 - alpha p_1 - rho (1 + alpha^2)) I``: there is always a solution, whatever masses, friction, bounds and alpha.
-So feasibility says nothing about manipulators; gain limits or a pole region would.
+Schur's complement of -2 rho I then leaves ``diag(He(A~_t P E~_t') + 2 rho A~_t A~_t', -eta I)``, negative for small
+rho, for i = j, which is enough because B is constant. Without multipliers
+``F_j = [-(A~_t P E~_bj')' - A~_bj P E~_t', -c I] T^-1`` with large c does the same.
+
+For a robot and ``P = [p_1 I, -p_2 I; -p_2 I, p_3 I]`` the first block is ``-2 (p_2 - alpha p_1 - rho (1 + alpha^2))``
+times I: there is always a solution, whatever masses, friction, bounds and alpha. So feasibility says nothing about
+manipulators; gain limits or a pole region would.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from quasilpv.conditions import guerra2007, i1, i2, i3, i53, ii5, ii6, ii6_direct, iii9, tanaka_wang, ts_pj
+from quasilpv.conditions import guerra2007, i1, i2, i3, i53, ii5, ii6, ii6_direct, ii7, ii8, iii9, tanaka_wang, ts_pj
 from quasilpv.conditions.condition import Condition
 from quasilpv.errors import InputError
 
@@ -17,6 +17,8 @@ CONDITIONS: dict[str, Condition] = {
         ii5.COROLLARY,
         ii6.CONDITION,
         ii6_direct.CONDITION,
+        ii7.CONDITION,
+        ii8.CONDITION,
         iii9.CONDITION,
         ts_pj.CONDITION,
         guerra2007.CONDITION,

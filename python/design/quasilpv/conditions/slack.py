@@ -7,7 +7,7 @@ T_b, G blocks. With a single block every such addition vanishes.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from fractions import Fraction
 from itertools import product
@@ -47,6 +47,7 @@ class SlackFamily:
     variables: tuple[Variable, ...]
     share: Callable[[tuple[int, ...]], dict[Variable, Fraction]]
     size: int
+    _multiples: dict[tuple[Variable, Fraction], Expression] = field(default_factory=dict, repr=False)
 
     def at(self, indices: tuple[int, ...]) -> Expression:
         """What is added to one entry."""
@@ -58,8 +59,15 @@ class SlackFamily:
         for indices, factor in factors.items():
             for variable, coefficient in self.share(indices).items():
                 total[variable] = total.get(variable, Fraction(0)) + factor * coefficient
-        terms = (T * coefficient for T, coefficient in total.items() if coefficient)
+        terms = (self._scaled(T, coefficient) for T, coefficient in total.items() if coefficient)
         return sum(terms, zeros(self.size, self.size))
+
+    def _scaled(self, variable: Variable, factor: Fraction) -> Expression:
+        """A multiple of an unknown; few factors occur, in many entries."""
+        key = (variable, factor)
+        if key not in self._multiples:
+            self._multiples[key] = variable * factor
+        return self._multiples[key]
 
 
 def slack_family(slack: Slack, name: str, blocks: npt.NDArray[np.intp] | None, size: int, sums: int) -> SlackFamily:

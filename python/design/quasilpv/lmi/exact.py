@@ -65,8 +65,8 @@ def is_positive_triangle(rows: list[list[int]]) -> bool:
     """Whether a symmetric integer matrix is positive definite, decided without rounding.
 
     The minors of long integers are expensive, so that short ones are tried first. With S a diagonal of powers of two
-    that brings the diagonal of ``S M S`` near ``2^SHORT_BITS``, its entries are cut to whole numbers. What is cut off is
-    a matrix of n x n entries below 1, of norm below n: ``cut(S M S) - n I > 0`` proves M > 0, and M > 0 implies
+    that brings the diagonal of ``S M S`` near ``2^SHORT_BITS``, its entries are cut to whole numbers. What is cut off
+    is a matrix of n x n entries below 1, of norm below n: ``cut(S M S) - n I > 0`` proves M > 0, and M > 0 implies
     ``cut(S M S) + n I > 0``.
 
     Args:
