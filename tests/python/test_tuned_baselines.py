@@ -14,8 +14,9 @@ from quasilpv.errors import InfeasibleError
 from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.velocity_law import VelocityLaw
 from quasilpv.release import Release, release
-from quasilpv.synthesis import CONTROLLERS, Specification, baselines, tuned_baselines
-from quasilpv.synthesis.acceleration_design import design_acceleration_law
+from quasilpv.synthesis import CONTROLLERS, Specification, baselines, specification, tuned_baselines, tuning_search
+from quasilpv.synthesis.acceleration_design import design_acceleration_law, no_progress
+from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import robot
 from reference.step import ComputedTorque, OutputStage, Pid, Sample, SpeedFilter
@@ -131,7 +132,7 @@ def test_when_computed_torque_decouples_expect_the_scalar_loops_of_the_inertia_r
 
 @cache
 def tuned(controller: str) -> TrackingDesign:
-    return CONTROLLERS[controller].design(robot("arm3"), Specification(), tuned_baselines.no_progress)
+    return CONTROLLERS[controller].design(robot("arm3"), Specification(), no_progress)
 
 
 def performance(controller: str, tuning: baselines.Tuning) -> tuple[float, float, float]:
@@ -196,12 +197,35 @@ def test_when_the_gains_of_the_thesis_meet_the_same_bounds_expect_only_computed_
 
 def test_when_the_budget_is_counted_expect_that_of_the_default_design() -> None:
     default = design_acceleration_law(robot("arm3"), Specification())
-    assert tuned_baselines.SCALES_PER_CANDIDATE * default.candidates_tried == tuned_baselines.SEARCH_BUDGET
-    assert {tuned(controller).report["candidates_tried"] for controller in TUNED} == {tuned_baselines.SEARCH_BUDGET}
+    assert tuning_search.SCALES_PER_CANDIDATE * default.candidates_tried == tuning_search.SEARCH_BUDGET
+    for controller in TUNED:  # a descent may converge before its share is spent
+        assert tuned(controller).report["candidates_tried"] > 0.8 * tuning_search.SEARCH_BUDGET
+        assert tuned(controller).report["candidates_tried"] <= tuning_search.SEARCH_BUDGET
+
+
+def test_when_a_law_contains_another_as_a_limit_expect_its_search_to_find_nothing_worse() -> None:
+    without, with_observer = (tuned(name).report["disturbance_gain_s2"] for name in ("ctc-tuned", "ctc-dob-tuned"))
+    assert with_observer <= 1.01 * without
+
+
+@pytest.mark.parametrize("controller", TUNED)
+def test_when_single_numbers_of_a_tuned_baseline_move_expect_no_better_admissible_one(controller: str) -> None:
+    """A constrained optimum: every step of 5 % that lowers the objective by as much breaks a constraint."""
+    chosen, plants = tuned(controller), PlantGrid.screen(robot("arm3"))
+    law = tuned_baselines.pid_law if controller == "pid-tuned" else tuned_baselines.computed_torque_law
+    search = tuning_search.TuningSearch(robot("arm3"), Specification(), law, {}, plants, no_progress)
+    numbers = tuning_of(chosen)
+    best = search.disturbance_gain(search.loops(numbers, plants), plants)
+    for name in ("bandwidth_rad_s", "velocity_filter_time_constant_s", "inertia_scale"):
+        for factor in (1.05, 1 / 1.05):
+            moved = replace(numbers, **{name: factor * getattr(numbers, name)})
+            loops = search.loops(moved, plants)
+            if search.disturbance_gain(loops, plants) < 0.98 * best:
+                assert not search.is_robust(loops) or search.torque_increment(loops) > search.activity_bound_nm
 
 
 def test_when_the_noise_of_the_design_is_compared_with_the_scenarios_expect_the_same() -> None:
-    assert tuned_baselines.VELOCITY_NOISE_RAD_S == scenarios.VELOCITY_NOISE_RAD_S
+    assert specification.VELOCITY_NOISE_RAD_S == scenarios.VELOCITY_NOISE_RAD_S
 
 
 def test_when_the_torque_may_not_move_expect_no_design_and_the_reason() -> None:
@@ -222,8 +246,8 @@ def test_when_a_tuned_baseline_is_released_expect_the_law_kind_of_its_family_and
         numbers = {name: report[name] for name in baselines.Tuning.__dataclass_fields__}
         assert list(law.gp) == pytest.approx([baselines.Tuning(**numbers).unit_gains()[0]] * 2)
         assert law.disturbance_observer_bandwidth_rad_s == report["observer_bandwidth_rad_s"]
-    again = release("arm2", controller)
-    assert again.artifact.hash == made.artifact.hash
+    if kind == "pid":  # the search is the same for all
+        assert release("arm2", controller).artifact.hash == made.artifact.hash
 
 
 def test_when_the_poles_are_equal_expect_the_gains_of_a_triple_pole() -> None:

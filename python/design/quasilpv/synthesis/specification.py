@@ -8,6 +8,9 @@ from typing import Any
 
 from quasilpv.errors import InputError
 
+VELOCITY_NOISE_RAD_S = 0.05
+"""Standard deviation of the noise on measured speeds the torque activity is bounded for: that of the scenarios."""
+
 
 @dataclass(frozen=True)
 class Specification:

@@ -14,10 +14,8 @@ The loops are the frozen sampled ones of all joints together (`quasilpv.loops`),
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +24,6 @@ import numpy.typing as npt
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.velocity_law import VelocityLaw
-from quasilpv.synthesis import acceleration_design
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.baselines import (
     Tuning,
@@ -37,25 +34,21 @@ from quasilpv.synthesis.baselines import (
 from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
+from quasilpv.synthesis.tuning_search import Axes, Candidate, TuningSearch
 from quasilpv.systems.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
-
-VELOCITY_NOISE_RAD_S = 0.05
-"""Standard deviation of the noise on measured speeds the torque activity is bounded for: that of the scenarios."""
-
-SCALES_PER_CANDIDATE = 3
-SEARCH_BUDGET = SCALES_PER_CANDIDATE * acceleration_design.LARGEST_SEARCH
-"""The default design tries three scales of the design inertia at every point of its search."""
-
-# Coarse grids, in units of the sample rate (bandwidths), of the sample period (filter) and of the nominal inertia.
-Axes = Mapping[str, tuple[float, ...]]
 
 
 def _geometric(low: float, high: float, count: int) -> tuple[float, ...]:
     return tuple(float(value) for value in np.geomspace(low, high, count))
 
 
+NEXT_TO_NONE = 1e-4
+"""Observer bandwidth, as a part of the sample rate, at which `ctc-dob` is `ctc` for all that can be measured: the law
+without observer is a branch of the search for the law with one."""
+
+# Coarse grids.
 PID: Axes = {
     "bandwidth": _geometric(0.005, 0.2, 8),
     "integral_ratio": (0.1, 0.3, 1.0),
@@ -71,118 +64,23 @@ COMPUTED_TORQUE: Axes = {
 }
 WITH_OBSERVER: Axes = {
     "bandwidth": _geometric(0.03, 0.3, 7),
-    "integral_ratio": (0.01, 0.1, 0.5),
+    "integral_ratio": (0.03, 0.3, 1.0),
     "filter_time": (1.0, 2.5, 6.0),
     "inertia_scale": _geometric(0.5, 2.0, 4),
-    "observer_bandwidth": (0.005, 0.02, 0.08, 0.3),
+    "observer_bandwidth": (NEXT_TO_NONE, 0.02, 0.2),
 }
-LARGEST = {"integral_ratio": 1.0, "payload_fraction": 1.0}
-
-FIRST_STEP = 0.2
-STEP_GROWTH = 1.5
 
 
-@dataclass(frozen=True)
-class _Candidate:
-    """A point of the search and what the grid says of it."""
-
-    tuning: Tuning
-    disturbance_gain: float
-    torque_increment_nm: float
-
-
-@dataclass(eq=False)
-class _Search:
-    """Evaluates points; remembers every one that is admissible and better than all before."""
-
-    robot: Robot
-    specification: Specification
-    law: Callable[[Robot, Tuning, FloatArray, float], VelocityLaw]
-    axes: Axes
-    plants: PlantGrid
-    progress: Progress
-    tried: int = 0
-    improvements: list[tuple[dict[str, float], _Candidate]] = field(default_factory=list)
-
-    @property
-    def activity_bound_nm(self) -> float:
-        """Largest admissible rms torque increment."""
-        return self.specification.torque_activity * float(np.linalg.norm(self.robot.limits.torque_nm))
-
-    def tuning(self, point: Mapping[str, float]) -> Tuning:
-        """The numbers of a point, SI."""
-        rate, period = self.specification.rate_hz, self.specification.sample_period_s
-        return Tuning(
-            bandwidth_rad_s=point["bandwidth"] * rate,
-            integral_ratio=point["integral_ratio"],
-            velocity_filter_time_constant_s=point["filter_time"] * period,
-            observer_bandwidth_rad_s=point.get("observer_bandwidth", 0.0) * rate,
-            inertia_scale=point["inertia_scale"],
-            payload_fraction=point.get("payload_fraction", 0.0),
-        )
-
-    def loops(self, tuning: Tuning, plants: PlantGrid) -> LoopGrid:
-        """The law of a point against the plants of a grid."""
-        return plants.loops(self.law(self.robot, tuning, plants.nominal, self.specification.sample_period_s))
-
-    def is_robust(self, loops: LoopGrid) -> bool:
-        """Whether all loops are stable: without delay, and with delay and spare factor."""
-        spare, delay = self.specification.margin_spare, self.specification.delay_s
-        return all(loops.is_stable(*case) for case in ((1.0, 0.0), (spare, delay), (1.0 / spare, delay), (1.0, delay)))
-
-    def disturbance_gain(self, loops: LoopGrid, plants: PlantGrid) -> float:
-        """Worst over the plants, s^2."""
-        unit = np.asarray(np.linalg.cholesky(plants.nominal), dtype=np.float64)
-        return loops.disturbance_gain(self.specification.disturbance_frequency_rad_s, unit)
-
-    def torque_increment(self, loops: LoopGrid) -> float:
-        """Worst over the plants, N m."""
-        return loops.torque_activity([self.specification.angle_noise_rad, VELOCITY_NOISE_RAD_S])
-
-    def visit(self, point: dict[str, float]) -> bool:
-        """Evaluate one point; returns whether it is the best so far."""
-        self.tried += 1
-        self.progress(self.tried, SEARCH_BUDGET)
-        tuning = self.tuning(point)
-        loops = self.loops(tuning, self.plants)
-        gain = self.disturbance_gain(loops, self.plants)
-        if self.improvements and gain >= self.improvements[-1][1].disturbance_gain:
-            return False
-        if not self.is_robust(loops):
-            return False
-        activity = self.torque_increment(loops)
-        if activity > self.activity_bound_nm:
-            return False
-        self.improvements.append((point, _Candidate(tuning, gain, activity)))
-        return True
-
-    def run(self) -> None:
-        """The coarse grid, then random steps from the best point for the rest of the budget.
-
-        A (1+1) evolution strategy in the logarithms, its step adapted to one success in five (Rechenberg 1973): the
-        best points lie where several constraints meet, where steps along single axes get stuck. Seeded.
-        """
-        for values in itertools.product(*self.axes.values()):
-            self.visit(dict(zip(self.axes, values, strict=True)))
-        random, step = np.random.default_rng(0), FIRST_STEP
-        while self.improvements and self.tried < SEARCH_BUDGET:
-            best = self.improvements[-1][0]
-            factors = np.exp(step * random.standard_normal(len(best)))
-            point = {
-                name: min(value * factor, LARGEST.get(name, math.inf))
-                for (name, value), factor in zip(best.items(), factors.tolist(), strict=True)
-            }
-            step *= STEP_GROWTH if self.visit(point) else STEP_GROWTH**-0.25
-
-
-def _pid_feedback(robot: Robot, tuning: Tuning, nominal: FloatArray, period: float) -> VelocityLaw:
+def pid_law(robot: Robot, tuning: Tuning, nominal: FloatArray, period: float) -> VelocityLaw:
+    """PID frozen at configurations of these nominal inertias, (B, n, n); the period is in s."""
     largest = stretched_inertia(robot, tuning.payload_fraction)
     per_joint = np.broadcast_to(np.diag(tuning.inertia_scale * largest), nominal.shape)
     kp, kd, ki = (gain * per_joint for gain in tuning.unit_gains())
     return VelocityLaw(period, kp, kd, ki, nominal, tuning.velocity_filter_time_constant_s)
 
 
-def _computed_torque_feedback(robot: Robot, tuning: Tuning, nominal: FloatArray, period: float) -> VelocityLaw:
+def computed_torque_law(robot: Robot, tuning: Tuning, nominal: FloatArray, period: float) -> VelocityLaw:
+    """Computed torque, with an observer if the tuning has one, likewise."""
     inertia = tuning.inertia_scale * nominal
     kp, kd, ki = (gain * inertia for gain in tuning.unit_gains())
     filter_time, observer = tuning.velocity_filter_time_constant_s, tuning.observer_bandwidth_rad_s
@@ -191,7 +89,7 @@ def _computed_torque_feedback(robot: Robot, tuning: Tuning, nominal: FloatArray,
 
 def pid_tuned(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
     """PID with feedforward, tuned. InfeasibleError: no point of the search meets the specification."""
-    search = _Search(robot, specification, _pid_feedback, PID, PlantGrid.screen(robot), progress)
+    search = TuningSearch(robot, specification, pid_law, PID, PlantGrid.screen(robot), progress)
     return _designed("pid-tuned", search, pid_design)
 
 
@@ -199,9 +97,7 @@ def computed_torque_tuned(
     robot: Robot, specification: Specification, progress: Progress = no_progress
 ) -> TrackingDesign:
     """Computed torque, tuned. InfeasibleError: no point of the search meets the specification."""
-    search = _Search(
-        robot, specification, _computed_torque_feedback, COMPUTED_TORQUE, PlantGrid.screen(robot), progress
-    )
+    search = TuningSearch(robot, specification, computed_torque_law, COMPUTED_TORQUE, PlantGrid.screen(robot), progress)
     return _designed("ctc-tuned", search, computed_torque_design)
 
 
@@ -209,35 +105,34 @@ def computed_torque_with_observer_tuned(
     robot: Robot, specification: Specification, progress: Progress = no_progress
 ) -> TrackingDesign:
     """Computed torque with observer, tuned. InfeasibleError: no point of the search meets the specification."""
-    search = _Search(robot, specification, _computed_torque_feedback, WITH_OBSERVER, PlantGrid.screen(robot), progress)
+    search = TuningSearch(robot, specification, computed_torque_law, WITH_OBSERVER, PlantGrid.screen(robot), progress)
     return _designed("ctc-dob-tuned", search, computed_torque_design)
 
 
 def _designed(
-    controller: str, search: _Search, build: Callable[[Robot, Specification, Tuning], TrackingDesign]
+    controller: str, search: TuningSearch, build: Callable[[Robot, Specification, Tuning], TrackingDesign]
 ) -> TrackingDesign:
     """The best candidate that also holds on the full grid, as a design with its report."""
-    search.run()
     robot, specification = search.robot, search.specification
-    about = f"{robot.id}: no {controller} design at {specification.rate_hz:g} Hz"
     plants = PlantGrid.full(robot)
-    for _, candidate in reversed(search.improvements):
-        tuning = candidate.tuning
-        loops = search.loops(tuning, plants)
+    for candidate in search.run():
+        loops = search.loops(candidate.tuning, plants)
         if not search.is_robust(loops):
             continue
         gain, activity = search.disturbance_gain(loops, plants), search.torque_increment(loops)
         if activity <= search.activity_bound_nm:
+            chosen = replace(candidate, disturbance_gain=gain, torque_increment_nm=activity)
             return replace(
-                build(robot, specification, tuning),
+                build(robot, specification, candidate.tuning),
                 controller=controller,
                 inputs={"controller": controller, "specification": specification.to_document()},
-                report=_report(search, _Candidate(tuning, gain, activity), loops),
+                report=_report(search, chosen, loops),
             )
+    about = f"{robot.id}: no {controller} design at {specification.rate_hz:g} Hz"
     raise InfeasibleError(f"{about}: no point of the search is stable with every payload within the torque activity")
 
 
-def _report(search: _Search, chosen: _Candidate, loops: LoopGrid) -> dict[str, Any]:
+def _report(search: TuningSearch, chosen: Candidate, loops: LoopGrid) -> dict[str, Any]:
     """The numbers a person asks for, JSON-able."""
     delays = {"no_delay": 0.0, "specified_delay": search.specification.delay_s}
     rates = {name: loops.worst(delay_s=delay).growth_rate_per_s for name, delay in delays.items()}
