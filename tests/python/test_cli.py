@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from quasilpv.artifact import Artifact, read_artifact
 from quasilpv.artifact.canonical import canonical_json, parse_document, with_hash
 from quasilpv.cli import run
+from quasilpv.experiments.result import Variant
 
 VERBS = ("list", "synth", "inspect", "verify", "robust", "track", "hil")
 ROW = {
@@ -267,21 +269,21 @@ def test_when_tracked_as_json_expect_the_rows_of_the_interface_and_nothing_else(
 
 
 def test_when_nothing_is_chosen_expect_all_default_controllers_and_a_coarse_encoder_row(
-    design: Design, tmp_path: Path
+    design: Design, monkeypatch: pytest.MonkeyPatch, artifact: bytes, tmp_path: Path
 ) -> None:
+    (tmp_path / "a.json").write_bytes(artifact)
+    wanted: list[Variant] = []
+
+    def instead(_robot: str, variant: Variant, *_options: object, **_more: object) -> Artifact:
+        wanted.append(variant)
+        return read_artifact(tmp_path / "a.json")
+
+    monkeypatch.setattr("quasilpv.cli.track.designed", instead)
     rows = json.loads(design("track", "serial-square", "--json").out)
-    assert [(row["controller"], row["sensors"]["encoder_bits"]) for row in rows] == [
-        ("pid", 20),
-        ("ctc", 20),
-        ("ctc-dob", 20),
-        ("dob-torque", 20),
-        ("dob-acceleration", 20),
-        ("dob-acceleration", 17),
-    ]
-    assert all(
-        (row["worst_growth_rate_per_s"] is None) == (row["controller"] in ("pid", "ctc", "ctc-dob")) for row in rows
-    )
-    assert len(list((tmp_path / "out/cache").iterdir())) == 6
+    tuned = ("pid", "pid-tuned", "ctc", "ctc-tuned", "ctc-dob", "ctc-dob-tuned")
+    expected = [*((name, 20) for name in (*tuned, "dob-torque", "dob-acceleration")), ("dob-acceleration", 17)]
+    assert [(variant.controller, variant.encoder_bits) for variant in wanted] == expected
+    assert [(row["controller"], row["sensors"]["encoder_bits"]) for row in rows] == expected
 
 
 def test_when_an_artifact_and_figures_are_asked_for_expect_one_row_and_the_figures(
@@ -320,9 +322,10 @@ def test_when_a_path_leaves_reach_or_modelling_box_expect_one_line_with_the_reas
 
 
 def test_when_run_over_lcm_in_lock_step_expect_the_run_in_process(design: Design) -> None:
-    outcome = design("hil", "serial-circle", "--controller", "ctc", "--json")
+    outcome = design("hil", "serial-circle", "--controller", "pid-tuned", "--json")
     row = json.loads(outcome.out)
     assert (outcome.code, outcome.err) == (0, "")
+    assert row["controller"] == "pid-tuned"  # its law kind is pid
     assert row["mode"] == "lockstep"
     assert row["identical_to_in_process"] is True
     assert {name: row[name] for name in row["in_process"]} == row["in_process"]

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
+from quasilpv.cli.track import DEFAULT_CONTROLLERS
 from quasilpv.errors import InputError
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.figures import (
@@ -36,7 +37,7 @@ def default_result(joints: int = 3) -> TrackResult:
 
 
 def all_results() -> list[TrackResult]:
-    variants = [Variant(name) for name in ("pid", "ctc", "ctc-dob", "dob-acceleration")]
+    variants = [Variant(name) for name in DEFAULT_CONTROLLERS]
     return [synthetic_result(variant) for variant in (*variants, Variant("dob-acceleration", 17))]
 
 

@@ -22,7 +22,7 @@ from quasilpv.cli.options import (
 from quasilpv.cli.results import COLUMNS, cells
 from quasilpv.experiments.hil import HilResult, Mode, require_identical, run_over_lcm
 from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
+from quasilpv.experiments.track import PlantKind, TrackingExperiment, track, variant_of
 from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
@@ -58,19 +58,18 @@ def hil_command(
     kind = cast(PlantKind, plant_kind(plant))
     variant = Variant(require_controller(controller), ENCODER_BITS if encoder_bits is None else encoder_bits)
     sensors = sensors_of(variant.encoder_bits)
+    given = None if artifact is None else read_artifact(artifact)
     with progress(2) as steps:
         steps.begin("in process")
-        chosen = (
-            designed(experiment.robot.id, variant, rate_hz, steps.parts)
-            if artifact is None
-            else read_artifact(artifact)
-        )
-        folder = out / experiment.name / chosen.law.kind
-        in_process = track(experiment, chosen, folder, plant=kind, sensors=sensors)
+        chosen = given or designed(experiment.robot.id, variant, rate_hz, steps.parts)
+        if given is not None:
+            variant = variant_of(given, sensors)
+        folder = out / experiment.name / variant.slug
+        in_process = track(experiment, chosen, folder, plant=kind, sensors=sensors, variant=variant)
         steps.end()
         steps.begin("over LCM")
         mode: Mode = "realtime" if real_time else "lockstep"
-        over_lcm = run_over_lcm(experiment, chosen, folder, plant=kind, sensors=sensors, mode=mode)
+        over_lcm = run_over_lcm(experiment, chosen, folder, plant=kind, sensors=sensors, mode=mode, variant=variant)
         steps.end()
     if not real_time:
         require_identical(over_lcm.result.run, in_process.run)

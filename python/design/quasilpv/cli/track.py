@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, cast
 
@@ -25,12 +25,21 @@ from quasilpv.cli.options import (
 from quasilpv.cli.results import print_results
 from quasilpv.errors import InputError
 from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
+from quasilpv.experiments.track import PlantKind, TrackingExperiment, track, variant_of
 from quasilpv.figures.gallery import write_comparison, write_gallery
 from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
-DEFAULT_CONTROLLERS = ("pid", "ctc", "ctc-dob", "dob-torque", "dob-acceleration")
+DEFAULT_CONTROLLERS = (
+    "pid",
+    "pid-tuned",
+    "ctc",
+    "ctc-tuned",
+    "ctc-dob",
+    "ctc-dob-tuned",
+    "dob-torque",
+    "dob-acceleration",
+)
 COARSE_ENCODER_BITS = 17
 PATH_ROBOT = "arm3"
 
@@ -47,9 +56,8 @@ class _Session:
     def run(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> TrackResult:
         artifact = self.given or designed(experiment.robot.id, variant, self.rate_hz, progress=steps.parts)
         folder = self.out / experiment.name / variant.slug
-        result = track(experiment, artifact, folder, plant=self.plant, sensors=sensors_of(variant.encoder_bits))
-        # A result names the law kind, which several controllers share; of a given artifact it is all there is to say.
-        return result if self.given else replace(result, variant=variant)
+        sensors = sensors_of(variant.encoder_bits)
+        return track(experiment, artifact, folder, plant=self.plant, sensors=sensors, variant=variant)
 
 
 def track_command(
@@ -129,9 +137,9 @@ def _variants(
     given: Artifact | None, controllers: Sequence[str] | None, encoder_bits: int | None, no_compensation: bool
 ) -> list[Variant]:
     bits = ENCODER_BITS if encoder_bits is None else encoder_bits
-    sensors_of(bits)
+    sensors = sensors_of(bits)
     if given is not None:
-        return [Variant(given.law.kind, bits)]
+        return [variant_of(given, sensors)]
     if no_compensation:
         return [Variant(require_controller(name), bits, False) for name in controllers or [DEFAULT_CONTROLLER]]
     variants = [Variant(require_controller(name), bits) for name in controllers or DEFAULT_CONTROLLERS]

@@ -20,7 +20,17 @@ DEFAULT_CACHE = Path("out/cache")
 
 # The rooms whose code decides what a design is and whether it is released; a change in any of them makes every kept
 # design stale.
-_DESIGN_ROOMS = ("systems", "polytopes", "loops", "lmi", "conditions", "synthesis", "certificate", "artifact", "release.py")
+_DESIGN_ROOMS = (
+    "systems",
+    "polytopes",
+    "loops",
+    "lmi",
+    "conditions",
+    "synthesis",
+    "certificate",
+    "artifact",
+    "release.py",
+)
 
 
 def kept_design(

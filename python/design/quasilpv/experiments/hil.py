@@ -17,7 +17,7 @@ import numpy as np
 
 from quasilpv.artifact import Artifact
 from quasilpv.errors import ClaimError, FaultStop, InputError, PlantError, QuasilpvError, TransportError
-from quasilpv.experiments.result import TrackResult
+from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import FloatArray, Run
 from quasilpv.experiments.track import (
     PlantKind,
@@ -60,7 +60,14 @@ class HilResult:
 
 
 def run_over_lcm(
-    experiment: TrackingExperiment, artifact: Artifact, folder: Path, *, plant: PlantKind, sensors: Sensors, mode: Mode
+    experiment: TrackingExperiment,
+    artifact: Artifact,
+    folder: Path,
+    *,
+    plant: PlantKind,
+    sensors: Sensors,
+    mode: Mode,
+    variant: Variant | None = None,
 ) -> HilResult:
     """Run controller and plant as two processes on this machine, with a session and a port of their own.
 
@@ -71,6 +78,7 @@ def run_over_lcm(
         plant: the true plant.
         sensors: encoders and speed noise.
         mode: lock-step (deterministic) or real time.
+        variant: what to call the controller, by default its law kind.
 
     Raises:
         InputError: robot and controller do not fit, an executable is missing, or the folder cannot be written.
@@ -86,7 +94,7 @@ def run_over_lcm(
     run = merge_records(records[SIMULATOR], records[CONTROLLER], artifact)
     return HilResult(
         mode,
-        summarise(run, experiment, artifact, plant=plant, sensors=sensors),
+        summarise(run, experiment, artifact, plant=plant, sensors=sensors, variant=variant),
         reports[CONTROLLER],
         reports[SIMULATOR],
     )

@@ -99,7 +99,13 @@ def write_run_files(
 
 
 def track(
-    experiment: TrackingExperiment, artifact: Artifact, folder: Path, *, plant: PlantKind, sensors: Sensors
+    experiment: TrackingExperiment,
+    artifact: Artifact,
+    folder: Path,
+    *,
+    plant: PlantKind,
+    sensors: Sensors,
+    variant: Variant | None = None,
 ) -> TrackResult:
     """Run one controller on one experiment in closed loop, in this process.
 
@@ -109,6 +115,7 @@ def track(
         folder: where the run's files are written; the run reads them from there.
         plant: the true plant.
         sensors: encoders and speed noise.
+        variant: what to call the controller; by default its law kind, which several controllers share.
 
     Raises:
         InputError: robot and controller do not fit, or the folder cannot be written.
@@ -120,7 +127,7 @@ def track(
         runtime, _runtime.Trajectory.load(str(files.trajectory)), _runtime.Scenario.load(str(files.scenario))
     )
     run = run_from_columns(columns, artifact.joints, artifact.sample_period_s)
-    return summarise(run, experiment, artifact, plant=plant, sensors=sensors)
+    return summarise(run, experiment, artifact, plant=plant, sensors=sensors, variant=variant)
 
 
 def run_from_columns(columns: dict[str, FloatArray], joints: int, sample_period_s: float) -> Run:
@@ -154,9 +161,15 @@ def run_from_columns(columns: dict[str, FloatArray], joints: int, sample_period_
 
 
 def summarise(
-    run: Run, experiment: TrackingExperiment, artifact: Artifact, *, plant: PlantKind, sensors: Sensors
+    run: Run,
+    experiment: TrackingExperiment,
+    artifact: Artifact,
+    *,
+    plant: PlantKind,
+    sensors: Sensors,
+    variant: Variant | None = None,
 ) -> TrackResult:
-    """The numbers of a run, however it was made."""
+    """The numbers of a run, however it was made; arguments as those of `track`."""
 
     def tool_position(angle: FloatArray) -> FloatArray:
         return np.array([experiment.robot.model.forward_kinematics(row)[:2] for row in angle])
@@ -164,9 +177,7 @@ def summarise(
     runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()), artifact.name)
     return TrackResult(
         scenario=experiment.name,
-        variant=Variant(
-            artifact.law.kind, sensors.encoder_bits, getattr(artifact.law, "disturbance_compensation", True)
-        ),
+        variant=variant or variant_of(artifact, sensors),
         rate_hz=round(1.0 / artifact.sample_period_s, 6),
         plant=plant,
         velocity_noise_rad_s=sensors.velocity_noise_rad_s,
@@ -177,6 +188,12 @@ def summarise(
         reference_position_m=tool_position(run.reference_angle_rad),
         true_disturbance=true_disturbance(run, artifact, runtime),
     )
+
+
+def variant_of(artifact: Artifact, sensors: Sensors) -> Variant:
+    """All there is to say of an artifact of unknown origin."""
+    compensated = getattr(artifact.law, "disturbance_compensation", True)
+    return Variant(artifact.law.kind, sensors.encoder_bits, compensated)
 
 
 def worst_growth_rate(artifact: Artifact) -> float | None:

@@ -29,7 +29,7 @@ BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
     "#D55E00",
     "#CC79A7",
 )
-PLUM, BROWN, NAVY = "#6A2F5B", "#8A5A00", "#12355B"
+PLUM, BROWN, NAVY = "#A0208F", "#6B4A00", "#12355B"
 """Dark shades of `PURPLE`, `ORANGE` and `SKY`, for the tuned versions of what these stand for."""
 JOINT_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 CONTROLLER_COLOURS = {
