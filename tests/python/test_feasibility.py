@@ -1,16 +1,20 @@
 """Compiled inequalities, families affine in parameters, and decisions that are proved."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
+from itertools import combinations
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import sparse
 
-from quasilpv.lmi import Outcome, Problem, Variable, block, he
+from quasilpv.lmi import Outcome, Problem, Variable, block, he, is_positive_definite, to_rational
 from quasilpv.lmi.compiled import CompiledProblem, compile_family, rounded
 from quasilpv.lmi.feasibility import decide
+from quasilpv.lmi.independence import independent_columns
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -42,7 +46,7 @@ def test_compiled_matrices_are_the_values_of_the_expressions(seed: int) -> None:
     problem = random_problem(seed)
     compiled = CompiledProblem.of(problem)
     rng = np.random.default_rng(seed)
-    point = rng.standard_normal(len(compiled.kept))
+    point = rng.standard_normal(len(compiled.layout.kept))
     values = compiled.values(point)
     coefficients, offset = compiled.matrix()
     expected = []
@@ -67,7 +71,7 @@ def test_integer_check_agrees_with_rational_evaluation_of_the_expressions(seed: 
             if v.symmetric:
                 values[v] = values[v] + values[v].T + 5 * np.eye(v.rows)
         point = np.concatenate([_packed(v, values[v]) for v in problem.variables])
-        full = CompiledProblem(compiled.layout, compiled.coefficients, compiled.denominator, np.arange(point.size))
+        full = replace(compiled, layout=replace(compiled.layout, kept=np.arange(point.size)))
         assert full.holds_exactly(point) == problem.holds_exactly(values)
         verdicts.add(full.holds_exactly(point))
 
@@ -86,9 +90,51 @@ def test_dependent_unknowns_are_dropped_without_loss() -> None:
     problem.positive("other", P - T - S)
     compiled = CompiledProblem.of(problem)
     assert compiled.layout.unknowns == 9
-    assert len(compiled.kept) == 6
+    assert len(compiled.layout.kept) == 6
     coefficients, _ = compiled.matrix()
     assert np.linalg.matrix_rank(coefficients.toarray()) == 6
+
+
+@given(SEEDS)
+@settings(max_examples=25, deadline=None)
+def test_kept_columns_are_a_basis_and_no_basis_has_fewer_entries(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count, rank = int(rng.integers(2, 7)), int(rng.integers(1, 5))
+    rows = int(rng.integers(3, 40))
+    matrix = rng.integers(-3, 4, (rows, rank)) @ rng.integers(-1, 2, (rank, count)).astype(float)
+    kept = independent_columns(sparse.csr_matrix(matrix))
+    true_rank = np.linalg.matrix_rank(matrix)
+    assert len(kept) == true_rank
+    bases = [
+        subset
+        for subset in map(list, combinations(range(count), true_rank))
+        if np.linalg.matrix_rank(matrix[:, subset]) == true_rank
+    ]
+    assert kept.tolist() in bases
+    assert np.count_nonzero(matrix[:, kept]) == min(np.count_nonzero(matrix[:, subset]) for subset in bases)
+
+
+def test_when_there_are_more_columns_than_are_taken_at_once_expect_every_dependence_found() -> None:
+    rng = np.random.default_rng(0)
+    independent = sparse.random(2000, 150, density=0.02, random_state=0) + sparse.eye(2000, 150)
+    repeated = independent @ sparse.csr_matrix(rng.integers(-2, 3, (150, 60)))
+    assert independent_columns(sparse.hstack([repeated, independent]).tocsr()).tolist() == list(range(60, 210))
+
+
+@pytest.mark.parametrize("step", [1.0, 0.1, 2.0**-70])
+def test_when_integers_are_long_or_short_expect_the_same_exact_sums(step: float) -> None:
+    compiled = compile_family(family, {"a": 0.0, "b": 0.0})
+    assert compiled is not None
+    member = compiled.at({"a": 3.0 * step, "b": -7.0 * step})
+    for point in (np.array([1.0, 0.5, 3.0]), np.array([1.0 / 3.0, 2.0**-60, 1e6])):
+        long = replace(member, coefficients=member.coefficients.astype(object))
+        assert member.first_violated(point) == long.first_violated(point)
+        exact = {v: to_rational(x) for v, x in member.values(point).items()}
+        a, b = Fraction(3.0 * step), Fraction(-7.0 * step)
+        A = np.array([[a - 1, 2 * b], [Fraction(1, 2), -3 - a]], dtype=object)
+        (P,) = exact.values()
+        holds = is_positive_definite(P) and is_positive_definite(-(A @ P + P @ A.T))
+        assert member.holds_exactly(point) == holds
 
 
 def family(parameters: Mapping[str, float]) -> Problem:

@@ -9,7 +9,7 @@ updates numbers instead of building matrices.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from math import lcm
@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.linalg import qr
 
 from quasilpv.lmi.assembly import unknown_offsets, unpack
-from quasilpv.lmi.exact import has_positive_minors, over_common_denominator
+from quasilpv.lmi.exact import is_positive_triangle, over_common_denominator
 from quasilpv.lmi.expressions import Expression, Variable
+from quasilpv.lmi.independence import independent_columns
 from quasilpv.lmi.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -31,6 +31,12 @@ ExactArray = npt.NDArray[Any]
 
 CANDIDATE_BITS = 40
 """A candidate point is rounded to this many bits below its largest entry before it is checked exactly."""
+
+SHORT = 2**62
+"""Integers below it, in magnitude, are held in 64 bits."""
+
+HALF = 2 ** (CANDIDATE_BITS // 2)
+"""Cuts the integers of a candidate point in two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +49,8 @@ class Layout:
         names: of the inequalities.
         sizes: order of every inequality.
         variables: whose unknowns, one after the other, form x.
-        row, unknown: place of every coefficient, (nnz,); unknown -1 is the constant term.
+        row, unknown: place of every coefficient, (nnz,), row by row; unknown -1 is the constant term.
+        kept: unknowns that are free; the others are zero without loss, because their columns depend on the kept ones.
     """
 
     names: tuple[str, ...]
@@ -51,13 +58,14 @@ class Layout:
     variables: tuple[Variable, ...]
     row: IndexArray
     unknown: IndexArray
+    kept: IndexArray
 
-    @property
+    @cached_property
     def rows(self) -> int:
         """Number of rows of all upper triangles."""
         return sum(size * (size + 1) // 2 for size in self.sizes)
 
-    @property
+    @cached_property
     def unknowns(self) -> int:
         """Number of scalar unknowns."""
         return sum(variable.size for variable in self.variables)
@@ -72,6 +80,38 @@ class Layout:
             start += size * (size + 1) // 2
         return flags
 
+    @cached_property
+    def scale(self) -> FloatArray:
+        """From a coefficient to its part in ``svec``, (nnz,): 1 on the diagonal, sqrt(1/2) of twice what is off it."""
+        return np.where(self.diagonal, 1.0, np.sqrt(0.5))[self.row]
+
+    @cached_property
+    def columns(self) -> tuple[IndexArray, IndexArray, IndexArray]:
+        """Kept columns, one after the other: which coefficients, in which row, and where each column starts."""
+        column = np.full(self.unknowns + 1, -1)
+        column[self.kept] = np.arange(len(self.kept))
+        column = column[self.unknown]
+        order = np.argsort(column, kind="stable")
+        order = order[np.searchsorted(column[order], 0) :]
+        return order, self.row[order], np.searchsorted(column[order], np.arange(len(self.kept) + 1))
+
+    def sums(self, products: ExactArray) -> ExactArray:
+        """Sum over every row of one number per coefficient, (nnz,) -> (rows,)."""
+        rows, first, _ = self._starts
+        total = np.zeros(self.rows, dtype=products.dtype)
+        total[rows] = np.add.reduceat(products, first)
+        return total
+
+    @cached_property
+    def _starts(self) -> tuple[IndexArray, IndexArray, IndexArray]:
+        """The rows that have coefficients, the first one of each, and how many."""
+        return np.unique(self.row, return_index=True, return_counts=True)
+
+    @cached_property
+    def longest_row(self) -> int:
+        """Number of coefficients of the row that has the most."""
+        return int(self._starts[2].max(initial=0))
+
 
 @dataclass(frozen=True, eq=False)
 class CompiledProblem:
@@ -79,22 +119,21 @@ class CompiledProblem:
 
     Attributes:
         layout: where the coefficients belong.
-        coefficients: integers, (nnz,), off-diagonal ones of twice the symmetric part.
+        coefficients: integers, (nnz,), off-diagonal ones of twice the symmetric part; int64 where they are short.
         denominator: that all of them share.
-        kept: unknowns that are free; the others are zero without loss, because their columns depend on the kept ones.
     """
 
     layout: Layout
     coefficients: ExactArray
     denominator: int
-    kept: IndexArray
 
     @classmethod
     def of(cls, problem: Problem) -> CompiledProblem:
         """Compile one problem; its objective plays no part."""
         table = _Coefficients.of(problem)
-        layout = _layout(problem, table.places)
-        return cls(layout, table.integers, table.denominator, _independent_columns(layout, table.integers[None]))
+        short = max(table.denominator, _largest(table.integers)) < SHORT
+        integers = table.integers.astype(np.int64) if short else table.integers
+        return cls(_layout(problem, table.places, table.integers[None]), integers, table.denominator)
 
     def matrix(self) -> tuple[sparse.csc_matrix, FloatArray]:
         """``(G, g)`` with the scaled upper triangles ``svec(F(x)) = G x_kept + g``, in double.
@@ -102,14 +141,15 @@ class CompiledProblem:
         Off-diagonal entries carry a factor sqrt(2), so that inner products of matrices are those of vectors.
         """
         layout = self.layout
-        scale = np.where(layout.diagonal, 1.0, np.sqrt(0.5))[layout.row]
-        values = scale * np.array([c / self.denominator for c in self.coefficients.tolist()])
-        constant = layout.unknown < 0
-        offset = np.zeros(layout.rows)
-        np.add.at(offset, layout.row[constant], values[constant])
-        shape = (layout.rows, layout.unknowns)
-        places = (layout.row[~constant], layout.unknown[~constant])
-        return sparse.csc_matrix((values[~constant], places), shape=shape)[:, self.kept], offset
+        values = layout.scale * self._doubles()
+        offset = layout.sums(np.where(layout.unknown < 0, values, 0.0))
+        order, rows, starts = layout.columns
+        return sparse.csc_matrix((values[order], rows, starts), shape=(layout.rows, len(layout.kept))), offset
+
+    def _doubles(self) -> FloatArray:
+        if self.coefficients.dtype == np.int64:
+            return np.asarray(self.coefficients / float(self.denominator))
+        return np.array([c / self.denominator for c in self.coefficients.tolist()])
 
     def values(self, point: FloatArray) -> dict[Variable, FloatArray]:
         """One matrix per variable from the kept unknowns, (kept,)."""
@@ -125,22 +165,32 @@ class CompiledProblem:
     def first_violated(self, point: FloatArray) -> str | None:
         """Name of the first inequality that does not hold strictly at a point, or None."""
         x, denominator = _integers(self._full(point))
-        constant = self.layout.unknown < 0
-        factors = np.where(constant, denominator, x[self.layout.unknown])
-        entries = np.zeros(self.layout.rows, dtype=object)
-        np.add.at(entries, self.layout.row, self.coefficients * factors)
+        entries = self._entries(np.append(x, denominator))
         entries = np.where(self.layout.diagonal, 2 * entries, entries)
         start = 0
         for name, size in zip(self.layout.names, self.layout.sizes, strict=True):
             end = start + size * (size + 1) // 2
-            if not has_positive_minors(_triangle_rows(entries[start:end].tolist(), size)):
+            if not is_positive_triangle(_triangle_rows(entries[start:end].tolist(), size)):
                 return name
             start = end
         return None
 
+    def _entries(self, x: ExactArray) -> ExactArray:
+        """Upper triangles, off-diagonal entries doubled, at integer unknowns followed by what multiplies constants.
+
+        Products of a coefficient and half the bits of an unknown are summed in 64-bit integers where none overflows.
+        """
+        layout, coefficients = self.layout, self.coefficients
+        halves = x // HALF, x % HALF
+        largest = max(map(_largest, halves)) * layout.longest_row * _largest(coefficients)
+        if coefficients.dtype == np.int64 and largest < SHORT:
+            high, low = (layout.sums(coefficients * half.astype(np.int64)[layout.unknown]) for half in halves)
+            return np.asarray(high.astype(object) * HALF + low)
+        return layout.sums(coefficients.astype(object) * x[layout.unknown])
+
     def _full(self, point: FloatArray) -> FloatArray:
         full = np.zeros(self.layout.unknowns)
-        full[self.kept] = point
+        full[self.layout.kept] = point
         return full
 
 
@@ -153,14 +203,12 @@ class CompiledFamily:
         parameters: their names.
         coefficients: integers, (1 + parameters, nnz): the constant part, then one slope per parameter.
         denominator: that all of them share.
-        kept: as in `CompiledProblem`; the dependence holds for all parameters.
     """
 
     layout: Layout
     parameters: tuple[str, ...]
     coefficients: ExactArray
     denominator: int
-    kept: IndexArray
 
     def at(self, parameters: Mapping[str, float]) -> CompiledProblem:
         """The problem at a point.
@@ -171,8 +219,21 @@ class CompiledFamily:
         point = [Fraction(parameters[name]) for name in self.parameters]
         scale = lcm(1, *(value.denominator for value in point))
         factors = [scale, *(int(value * scale) for value in point)]
+        denominator = self.denominator * scale
+        if max(denominator, sum(abs(f) * m for f, m in zip(factors, self._magnitudes, strict=True))) < SHORT:
+            return CompiledProblem(self.layout, np.array(factors) @ self._short, denominator)
         coefficients = sum((f * row for f, row in zip(factors, self.coefficients, strict=True)), 0)
-        return CompiledProblem(self.layout, np.asarray(coefficients), self.denominator * scale, self.kept)
+        return CompiledProblem(self.layout, np.asarray(coefficients), denominator)
+
+    @cached_property
+    def _magnitudes(self) -> list[int]:
+        """Of the largest coefficient of every level."""
+        return [_largest(level) for level in self.coefficients]
+
+    @cached_property
+    def _short(self) -> npt.NDArray[np.int64]:
+        """The coefficients as 64-bit integers, for points at which they are short."""
+        return self.coefficients.astype(np.int64)
 
 
 def compile_family(build: Callable[[Mapping[str, float]], Problem], base: Mapping[str, float]) -> CompiledFamily | None:
@@ -199,12 +260,10 @@ def compile_family(build: Callable[[Mapping[str, float]], Problem], base: Mappin
     scale = lcm(1, *(value.denominator for value in shift))
     constant = scale * origin - sum((int(scale * p) * row for p, row in zip(shift, slopes, strict=True)), 0)
     coefficients = np.stack([constant, *(scale * row for row in slopes)])
-    layout = _layout(problem, places)
-    kept = _independent_columns(layout, coefficients)
-    family = CompiledFamily(layout, names, coefficients, denominator * scale, kept)
+    family = CompiledFamily(_layout(problem, places, coefficients), names, coefficients, denominator * scale)
     for test, row in zip(tests, seen, strict=True):
         member = family.at(test)
-        if np.any(member.coefficients * denominator != row * member.denominator):
+        if np.any(member.coefficients.astype(object) * denominator != row * member.denominator):
             return None
     return family
 
@@ -278,45 +337,49 @@ def _exact_entries(
         yield row, column, np.full(row.shape, -1), *over_common_denominator(expression.constant[row, column])
 
 
-def _layout(problem: Problem, places: IndexArray) -> Layout:
-    row, unknown = np.divmod(places, 1 + sum(variable.size for variable in problem.variables))
-    return Layout(
+def _layout(problem: Problem, places: IndexArray, coefficients: ExactArray) -> Layout:
+    """Layout of coefficients at the given places, (levels, nnz)."""
+    unknowns = sum(variable.size for variable in problem.variables)
+    row, unknown = np.divmod(places, 1 + unknowns)
+    layout = Layout(
         names=tuple(c.name for c in problem.constraints),
         sizes=tuple(c.expression.shape[0] for c in problem.constraints),
         variables=problem.variables,
         row=row,
         unknown=unknown - 1,
+        kept=np.arange(unknowns),
     )
+    return replace(layout, kept=_free_unknowns(layout, coefficients))
 
 
-def _independent_columns(layout: Layout, coefficients: ExactArray) -> IndexArray:
+def _free_unknowns(layout: Layout, coefficients: ExactArray) -> IndexArray:
     """Unknowns whose columns span those of all, whatever the parameters; (levels, nnz) coefficients, exact.
 
     The slack matrices of a representation, for example, enter through their differences only. Columns are compared over
     all levels (constant part and slopes) at once: a dependence found here holds for every parameter point.
     """
     if layout.unknowns > MAX_COLUMNS_REDUCED:
-        return np.arange(layout.unknowns)
+        return layout.kept
     linear = layout.unknown >= 0
-    height = layout.rows * len(coefficients)
     row = np.concatenate([layout.row[linear] + level * layout.rows for level in range(len(coefficients))])
-    values = coefficients[:, linear].ravel()
-    largest = max(map(abs, values.tolist()), default=1)
     column = np.tile(layout.unknown[linear], len(coefficients))
-    shape = (height, layout.unknowns)
-    stacked = sparse.csr_matrix(([value / largest for value in values.tolist()], (row, column)), shape=shape)
-    dense = stacked[np.flatnonzero(np.diff(stacked.indptr))].toarray()
-    norms = np.linalg.norm(dense, axis=0)
-    triangle, pivots = qr(dense / np.where(norms > 0.0, norms, 1.0), mode="r", pivoting=True)
-    pivot_sizes = np.abs(np.diag(triangle))
-    rank = int(np.count_nonzero(pivot_sizes > RANK_TOLERANCE * max(pivot_sizes, default=0.0)))
-    return np.sort(pivots[:rank])
+    values = coefficients[:, linear].ravel()
+    largest = max(1, _largest(values))
+    shape = (layout.rows * len(coefficients), layout.unknowns)
+    return independent_columns(
+        sparse.csr_matrix(([value / largest for value in values.tolist()], (row, column)), shape=shape)
+    )
 
 
 MAX_COLUMNS_REDUCED = 3_000
 """Larger problems keep all unknowns: the factorisation would cost more than it saves."""
 
-RANK_TOLERANCE = 1e-9
+
+def _largest(integers: ExactArray) -> int:
+    """The largest magnitude, 0 without entries."""
+    if integers.dtype == np.int64:
+        return int(np.max(np.abs(integers), initial=0))
+    return max(map(abs, integers.tolist()), default=0)
 
 
 def _integers(point: FloatArray) -> tuple[ExactArray, int]:
