@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +31,15 @@ class Claim:
     def positive(cls, name: str, exact: fmpq_mat) -> Claim:
         """Decide ``exact > 0``."""
         return cls(name, is_positive_definite(exact), _margin(exact))
+
+
+def all_positive(name: str, numbers: Iterable[fmpq]) -> Claim:
+    """The claim that all these numbers are positive."""
+    values = list(numbers)
+    size = len(values)
+    return Claim.positive(
+        name, fmpq_mat(size, size, [x if i == j else 0 for i, x in enumerate(values) for j in range(size)])
+    )
 
 
 def _margin(exact: fmpq_mat) -> float:

@@ -33,10 +33,11 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat
 
-from quasilpv.certificate.claims import Claim
+from quasilpv.certificate.claims import Claim, all_positive
 from quasilpv.certificate.exact_matrices import identity, matrix, rational, symmetric
 from quasilpv.certificate.gate_data import loop_data
 from quasilpv.certificate.gate_loop import AccelerationLoopData
+from quasilpv.certificate.torque_envelope import room_claim
 from quasilpv.certificate.vertex_tables import VertexTable
 
 OUTPUTS = ("angle_rad", "speed_rad_s", "acceleration_rad_s2")
@@ -106,7 +107,7 @@ def check_sampled_envelope(document: Mapping[str, Any]) -> Iterator[Claim]:
     law = loop_data(document)
     loops = [ErrorDynamics.of_disturbance(law, pole) for pole in law.filter_poles()]
     margins = [rational(margin) for margin in envelope["reference_margin_rad"]]
-    yield all_positive("envelope: margins leave room for a reference", _room(document["domain"], margins))
+    yield room_claim(document["domain"], margins)
 
     box, torque = envelope["box_set"], envelope["torque_set"]
     yield from _level_claims("box set", loops, rational(document["sample_period_s"]), box)
@@ -191,21 +192,6 @@ def largest_entries(table: VertexTable) -> list[list[fmpq]]:
             for j in range(columns):
                 total[i][j] += max(abs(rational(vertex[i][j])) for vertex in vertices) / len(table.blocks)
     return total
-
-
-def _room(domain: Mapping[str, Any], margins: Sequence[fmpq]) -> Iterator[fmpq]:
-    """Per joint, the margin itself and what the operating domain leaves between its margins."""
-    for (low, high), margin in zip(domain["angle_rad"], margins, strict=True):
-        yield from (margin, rational(high) - rational(low) - 2 * margin)
-
-
-def all_positive(name: str, numbers: Iterable[fmpq]) -> Claim:
-    """The claim that all these numbers are positive."""
-    values = list(numbers)
-    size = len(values)
-    return Claim.positive(
-        name, fmpq_mat(size, size, [x if i == j else 0 for i, x in enumerate(values) for j in range(size)])
-    )
 
 
 def _feedback(law: AccelerationLoopData, e: fmpq_mat, speed: fmpq_mat, integral: fmpq_mat) -> fmpq_mat:

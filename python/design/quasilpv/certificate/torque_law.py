@@ -30,13 +30,15 @@ all ordered i != j (Tuan et al. 2001, Theorem 2.2).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from flint import fmpq, fmpq_mat
+from flint import fmpq_mat
 
 from quasilpv.certificate.claims import Claim
+from quasilpv.certificate.double_sum import double_sum, he
 from quasilpv.certificate.exact_matrices import identity, matrix, rational, stack, symmetric, zero
+from quasilpv.certificate.torque_envelope import check_torque_envelope
 from quasilpv.certificate.vertex_tables import VertexTable
 
 TABLES = ("inertia", "feedback", "observer")
@@ -58,6 +60,7 @@ def check_dob_torque(document: Mapping[str, Any]) -> tuple[Claim, ...]:
         *_feedback_claims(inertia.vertices(), feedback.vertices(), witness["feedback"]),
         *_observer_claims(inertia.vertices(), observer.vertices(), witness["observer"]),
         *(claim for name, table in tables.items() for claim in table.collapse_claim(name)),
+        *check_torque_envelope(document, *(table.vertices() for table in tables.values())),
     )
 
 
@@ -74,7 +77,7 @@ def _feedback_claims(
     closed = [(A + B * K) * P for K in gains]
 
     def bounded_real(i: int, j: int) -> fmpq_mat:
-        decreasing = _he(closed[i] * E[j].transpose()) + 2 * alpha * E[i] * P * E[j].transpose()
+        decreasing = he(closed[i] * E[j].transpose()) + 2 * alpha * E[i] * P * E[j].transpose()
         error = E[i] * P * C.transpose()
         return symmetric([[decreasing, B, error], [None, -gamma * one, none], [None, None, -one]])
 
@@ -83,8 +86,8 @@ def _feedback_claims(
 
     yield Claim.positive("feedback: decay rate", matrix([[alpha]]))
     yield Claim.positive("feedback: P", P)
-    yield from _double_sum("feedback: bounded real", bounded_real, len(inertia))
-    yield from _double_sum("feedback: pole disk", pole_disk, len(inertia))
+    yield from double_sum("feedback: bounded real", bounded_real, len(inertia))
+    yield from double_sum("feedback: pole disk", pole_disk, len(inertia))
 
 
 def _observer_claims(
@@ -104,28 +107,12 @@ def _observer_claims(
     for i, (M, L) in enumerate(zip(inertia, gains, strict=True)):
         X = Q * (A - L * C)
         constraint = stack([[D, -M]])
-        top = symmetric([[_he(X) + 2 * alpha * Q, Q * G], [None, none]]) + _he(F * constraint)
+        top = symmetric([[he(X) + 2 * alpha * Q, Q * G], [None, none]]) + he(F * constraint)
         inputs = stack([[Q * H, -nu * Q * L], [none, none]])
         output = stack([[D.transpose()], [none]])
         gains_bound = symmetric([[-gamma * one, none], [None, -gamma * one]])
         bounded_real = symmetric([[top, inputs, output], [None, gains_bound, zero(2 * n, n)], [None, None, -one]])
         yield Claim.positive(f"observer: bounded real {i}", -bounded_real)
-        top = symmetric([[-rho * Q, zero(4 * n, n)], [None, none]]) + _he(F_disk * constraint)
+        top = symmetric([[-rho * Q, zero(4 * n, n)], [None, none]]) + he(F_disk * constraint)
         across = stack([[X.transpose()], [G.transpose() * Q]])
         yield Claim.positive(f"observer: pole disk {i}", -symmetric([[top, across], [None, -rho * Q]]))
-
-
-def _he(square: fmpq_mat) -> fmpq_mat:
-    """``X + X'``."""
-    return square + square.transpose()
-
-
-def _double_sum(name: str, entry: Callable[[int, int], fmpq_mat], count: int) -> Iterator[Claim]:
-    """Claims that ``sum_ij w_i w_j X_ij < 0`` for all convex weights; X_ij + X_ji must be symmetric."""
-    grid = [[entry(i, j) for j in range(count)] for i in range(count)]
-    for i in range(count):
-        yield Claim.positive(f"{name} {i} {i}", -grid[i][i])
-        for j in range(count):
-            if i != j:
-                relaxed = fmpq(2, count - 1) * grid[i][i] + grid[i][j] + grid[j][i]
-                yield Claim.positive(f"{name} {i} {j}", -relaxed)

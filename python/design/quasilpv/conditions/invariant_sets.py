@@ -1,13 +1,13 @@
 """Ellipsoids a linear system does not leave: the largest inside given bounds, the smallest that holds a disturbance.
 
-Statements about ``x+ = A x + v`` (sampled) and ``E(z) x' = A(z) x + B v`` with vertices ``E_i, A_i`` (continuous). Both
-are the S-procedure for quadratic functions (Boyd, El Ghaoui, Feron and Balakrishnan 1994, sections 5.2 and 6.1).
+For ``x+ = A x + v``; by the S-procedure for quadratic functions (Boyd, El Ghaoui, Feron and Balakrishnan 1994, sections
+5.2 and 6.1). For polytopic systems in continuous time: `quasilpv.conditions.polytopic_sets`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +15,7 @@ import numpy.typing as npt
 import scipy.linalg
 import scipy.optimize
 
-from quasilpv.conditions.blocks import double_sum
-from quasilpv.lmi import Expression, Problem, Variable, block, he, identity, zeros
+from quasilpv.lmi import Expression, Problem, Variable, block, identity, zeros
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -45,48 +44,11 @@ def sampled_level_set(
     problem = Problem()
     problem.positive("decrease", P * contraction - transition.T @ P @ transition)
     problem.positive("output", block([[P, output.T], [None, identity(1)]]))
-    problem.minimise(_trace(directions, P.expression))
+    problem.minimise(trace_along(directions, P.expression))
     return problem, P
 
 
-def polytopic_level_set(
-    inertia: Sequence[FloatArray],
-    system: Sequence[FloatArray],
-    outputs: FloatArray,
-    directions: FloatArray,
-    decay: float,
-) -> tuple[Problem, Variable]:
-    """Set ``x' S^-1 x <= 1`` that ``E(z) x' = A(z) x`` does not leave however z moves, in which every ``|C_k x| <= 1``.
-
-    Unknowns ``S = S' > 0`` and Z; minimise ``trace Z`` subject to ``[[Z, N'], [*, S]] > 0`` (Z bounds ``N' S^-1 N``),
-    ``C_k S C_k' < 1`` and, as a double sum, ``He(A_i S E_j') + 2 decay E_i S E_j' < 0``.
-
-    Args:
-        inertia: vertices E_i, (s, s) each.
-        system: vertices A_i, (s, s) each.
-        outputs: rows C_k, (k, s).
-        directions: N, (s, m).
-        decay: rate of decay of ``sqrt(x' S^-1 x)``.
-
-    Returns:
-        The problem and S.
-    """
-    S = Variable("S", len(system[0]), symmetric=True)
-    Z = Variable("Z", directions.shape[1], symmetric=True)
-    problem = Problem()
-
-    def decrease(i: int, j: int) -> Expression:
-        return he(system[i] @ S @ inertia[j].T) + (inertia[i] @ S @ inertia[j].T) * (2.0 * decay)
-
-    double_sum(problem, "decrease", decrease, len(system))
-    for k, row in enumerate(outputs):
-        problem.positive(f"output {k}", identity(1) - row[None] @ S @ row[:, None])
-    problem.positive("extent", block([[Z, directions.T], [None, S]]))
-    problem.minimise(_trace(np.eye(directions.shape[1]), Z.expression))
-    return problem, S
-
-
-def _trace(directions: FloatArray, matrix: Expression) -> Expression:
+def trace_along(directions: FloatArray, matrix: Expression) -> Expression:
     """``trace(N' X N)``."""
     total = zeros(1, 1)
     for direction in directions.T:
@@ -125,12 +87,12 @@ def sampled_peak_set(transition: FloatArray, inputs: FloatArray, output: FloatAr
         return np.asarray((X + X.T) / 2.0)
 
     slowest = float(np.max(np.abs(np.linalg.eigvals(transition)))) ** 2
-    found = _line_search(lambda x: (output @ least(x) @ output.T).item(), slowest, 1.0)
+    found = line_search(lambda x: (output @ least(x) @ output.T).item(), slowest, 1.0)
     spare = SPARE * np.diag(least(found).diagonal())
     return PeakSet(least(found, spare), found)
 
 
-def _line_search(objective: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function that tends to infinity at both ends of an interval is smallest."""
-    options = {"xatol": 1e-4 * (high - low)}
+def line_search(objective: Callable[[float], float], low: float, high: float, tolerance: float = 1e-4) -> float:
+    """Where a function of one variable is smallest between two bounds; ``tolerance`` is relative to their distance."""
+    options = {"xatol": tolerance * (high - low)}
     return float(scipy.optimize.minimize_scalar(objective, bounds=(low, high), method="bounded", options=options).x)

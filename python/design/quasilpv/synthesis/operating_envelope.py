@@ -17,7 +17,7 @@ import numpy.typing as npt
 from quasilpv.conditions.invariant_sets import PeakSet, sampled_level_set, sampled_peak_set
 from quasilpv.conditions.sampled_errors import SampledErrors, sampled_errors
 from quasilpv.errors import InfeasibleError
-from quasilpv.lmi import Problem, Variable
+from quasilpv.lmi import Problem, Solution
 from quasilpv.systems.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
@@ -79,8 +79,12 @@ def reference_margin(robot: Robot) -> FloatArray:
     return np.array([REFERENCE_MARGIN * (high - low) / 2.0 for low, high in robot.domain.angle_rad])
 
 
-def verified_value(problem: Problem, variable: Variable, about: str) -> FloatArray:
+def verified_solution(problem: Problem, about: str) -> Solution:
     """A point strictly inside the inequalities of a set.
+
+    Args:
+        problem: the inequalities, and what the set is to be best at.
+        about: names the robot in the error.
 
     Raises:
         InfeasibleError: none was found that exact arithmetic confirms.
@@ -88,7 +92,7 @@ def verified_value(problem: Problem, variable: Variable, about: str) -> FloatArr
     solution = problem.solve_inside(BACK_OFF)
     if not solution.verified:
         raise InfeasibleError(f"{about}: operating envelope: {solution.outcome.value}")
-    return np.asarray(solution.values[variable])
+    return solution
 
 
 def _level_set(robot: Robot, errors: SampledErrors, output: FloatArray, sample_period_s: float) -> dict[str, Any]:
@@ -98,7 +102,7 @@ def _level_set(robot: Robot, errors: SampledErrors, output: FloatArray, sample_p
     rows = np.eye(8)
     directions = np.column_stack([rows[0], rows[1], rows[5] + rows[7]])
     problem, P = sampled_level_set(errors.transition, output, directions, 1.0 - 2.0 * decay * sample_period_s)
-    value = verified_value(problem, P, robot.id)
+    value = verified_solution(problem, robot.id).values[P]
     shipped = value / np.outer(errors.units, errors.units)
     return {
         "P": ((shipped + shipped.T) / 2.0).tolist(),

@@ -7,6 +7,7 @@ from typing import Any
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.torque_design import TorqueDesign, design_torque_law
+from quasilpv.synthesis.torque_envelope import VertexTables, torque_envelope
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import Robot
 
@@ -31,8 +32,13 @@ def tracking_design(robot: Robot, specification: Specification, design: TorqueDe
     Args:
         robot, specification: what it was made for.
         design: vertex tables and evidence.
+
+    Raises:
+        InfeasibleError: the law has no verified operating envelope.
     """
     tables = design.law
+    witness = _witness(design)
+    envelope = torque_envelope(robot, VertexTables(tables.inertia, tables.feedback, tables.observer), witness)
     return TrackingDesign(
         controller="dob-torque",
         robot=robot,
@@ -50,7 +56,7 @@ def tracking_design(robot: Robot, specification: Specification, design: TorqueDe
         },
         inputs={"controller": "dob-torque", "specification": specification.to_document()},
         report=design.report(),
-        witness=_witness(design),
+        witness={**witness, "envelope": envelope},
     )
 
 
