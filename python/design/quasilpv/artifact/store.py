@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from quasilpv.artifact.canonical import canonical_cbor, canonical_json, member_path, parse_document
+from quasilpv.artifact.envelope import envelope_summary
 from quasilpv.artifact.files import read_bytes, write_atomically
 from quasilpv.artifact.schema import Artifact
 
@@ -77,6 +78,7 @@ def summary(artifact: Artifact) -> dict[str, Any]:
         "torque_limit_nm": list(artifact.limits.torque_nm),
         "slew_limit_nm_per_s": list(artifact.limits.slew_nm_per_s),
         "witness": artifact.witness is not None,
+        "envelope": envelope_summary(artifact),
         "verification": artifact.verification,
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from quasilpv.artifact.envelope import OperatingEnvelope
 from quasilpv.experiments.metrics import Metrics
 from quasilpv.experiments.run import FloatArray, Run
 from quasilpv.scenarios import ENCODER_BITS
@@ -72,6 +73,7 @@ class TrackResult:
         tool_position_m: (N, 2) true position of the tool.
         reference_position_m: (N, 2) where it should have been.
         true_disturbance: ``None`` for laws that estimate none.
+        envelope: what the artifact says of its operating envelope; ``None`` if it says nothing.
     """
 
     scenario: str
@@ -85,6 +87,7 @@ class TrackResult:
     tool_position_m: FloatArray
     reference_position_m: FloatArray
     true_disturbance: Disturbance | None
+    envelope: OperatingEnvelope | None = None
 
     @property
     def title(self) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact, write_artifact
 from quasilpv.artifact.canonical import canonical_json
+from quasilpv.artifact.envelope import OperatingEnvelope
 from quasilpv.errors import InputError
 from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.metrics import compute_metrics
@@ -187,6 +188,7 @@ def summarise(
         tool_position_m=tool_position(run.true_angle_rad),
         reference_position_m=tool_position(run.reference_angle_rad),
         true_disturbance=true_disturbance(run, artifact, runtime),
+        envelope=OperatingEnvelope.of(artifact),
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from quasilpv.experiments.result import TrackResult
 from quasilpv.figures.comparison import comparison_figure
+from quasilpv.figures.envelope import envelope_figure
 from quasilpv.figures.style import save
 from quasilpv.figures.tracking import (
     disturbance_figure,
@@ -18,7 +19,7 @@ from quasilpv.figures.tracking import (
 
 
 def write_gallery(result: TrackResult, folder: Path) -> list[Path]:
-    """Write path, errors, torques, speed error and, if the law estimates one, the disturbance of a run.
+    """Write path, errors, torques, speed error and, if the law has them, disturbance and operating envelope of a run.
 
     Returns:
         The files, PNG and SVG of each.
@@ -34,6 +35,8 @@ def write_gallery(result: TrackResult, folder: Path) -> list[Path]:
     }
     if result.true_disturbance is not None:
         figures["disturbance"] = disturbance_figure
+    if result.envelope is not None:
+        figures["envelope"] = envelope_figure
     return [file for name, draw in figures.items() for file in save(draw(result), folder / name)]
 
 
