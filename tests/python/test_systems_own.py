@@ -91,6 +91,15 @@ def test_equal_terms_and_dependent_ones_share_a_premise(A: sp.Matrix, expression
     assert_allclose(system.evaluate(system.premise_values(at)).A, exact, rtol=1e-14)
 
 
+def test_sums_that_are_proportional_up_to_rounding_share_a_premise() -> None:
+    first, second = 0.1 * x**2 + 0.7 * sp.cos(x), 0.3 * x**2 + 2.1 * sp.cos(x)
+    assert sp.Rational(0.3) / sp.Rational(0.1) != sp.Rational(2.1) / sp.Rational(0.7)
+    system = own(one_row(first, second))
+    assert len(system.premises) == 1
+    A = system.evaluate(system.premise_values([0.7, 1.0])).A
+    assert_allclose(A[0], [float(first.subs(x, 0.7)), float(second.subs(x, 0.7))], rtol=1e-14)
+
+
 def test_functions_that_only_look_dependent_on_the_domain_stay_apart() -> None:
     # sin(x) = x within 2e-11 of its size here, which is no identity.
     narrow = {x: (-1e-5, 1e-5), y: (0.0, 1.0)}
