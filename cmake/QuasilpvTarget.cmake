@@ -7,3 +7,15 @@ function(quasilpv_target target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
                                            -Wnon-virtual-dtor -Wold-style-cast -Werror -ffp-contract=off)
 endfunction()
+
+# An executable of the project, linked with one of its libraries.
+function(quasilpv_executable name source library)
+  add_executable(${name} ${source})
+  target_link_libraries(${name} PRIVATE ${library} CLI11::CLI11)
+  quasilpv_target(${name})
+  if(SKBUILD)
+    install(TARGETS ${name} DESTINATION ${SKBUILD_SCRIPTS_DIR})
+  else()
+    install(TARGETS ${name} DESTINATION bin)
+  endif()
+endfunction()

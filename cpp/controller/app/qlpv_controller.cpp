@@ -17,12 +17,6 @@ namespace {
 
 using namespace quasilpv;  // NOLINT(google-build-using-namespace): this file is the program
 
-constexpr const char* kFooter =
-    "Example:\n"
-    "  qlpv-controller --artifact artifact.json --trajectory trajectory.json --session 7 --record controller.csv &\n"
-    "  qlpv-simulator --artifact artifact.json --scenario scenario.json --session 7 --record plant.csv\n\n"
-    "Exit codes: 0 done, 2 bad input, 3 fault stop, 4 no real-time privilege, 5 no transport.";
-
 struct Options {
   CommonOptions common;
   std::string trajectory;
@@ -33,7 +27,7 @@ struct Options {
 void declare_all(CLI::App& app, Options& options) {
   static const std::map<std::string, SafeAction> kActions{{"zero", SafeAction::kZero},
                                                           {"gravity", SafeAction::kGravity}};
-  app.footer(kFooter);
+  app.footer(help_footer());
   declare(app, options.common);
   app.add_option("--trajectory", options.trajectory, "the reference, JSON or CBOR")->required();
   app.add_option("--safe-action", options.safe_action, "torque after a fault: zero (default), or gravity minus damping")
@@ -70,16 +64,14 @@ Json describe(const ControlLoop& loop, const ControllerRunReport& run, const Tel
 
 int exit_code(const ControlLoop& loop, const ControllerRunReport& run, const CommonOptions& options) {
   if (run.end == ControllerRunEnd::kPlantNeverHeard) {
-    throw TransportError("no measurement of session " + std::to_string(options.session) + " on " + options.url +
-                         " within " + std::to_string(options.timeout_s) + " s: is qlpv-simulator running?");
+    throw_never_heard(options, "measurement", "qlpv-simulator");
   }
   const bool ended_in_fault = loop.state() == ControllerState::kFault && loop.cause() != FaultCause::kStopRequested;
   if (!ended_in_fault && run.end != ControllerRunEnd::kPlantSilent) {
     return kExitDone;
   }
   const char* reason = ended_in_fault ? to_string(loop.cause()) : to_string(run.end);
-  std::cerr << "qlpv-controller: fault stop: " << reason << ", last sample " << loop.last_seq() << '\n';
-  return kExitFaultStop;
+  return report_fault_stop("qlpv-controller", reason, loop.last_seq());
 }
 
 int run(const CLI::App& app, Options& options) {
@@ -91,7 +83,7 @@ int run(const CLI::App& app, Options& options) {
   settings.realtime = apply_priority(app, common);
   ControlLoop loop(artifact, trajectory, settings);
 
-  const WireIdentity identity{common.session, artifact.hash_prefix(), artifact.joints()};
+  const WireIdentity identity = identity_of(common, artifact);
   LcmLink link(Side::kController, identity, common.url, common.allow_network);
   auto telemetry_link =
       std::make_unique<LcmLink>(Side::kController, identity, common.url, common.allow_network, Listen::kNothing);

@@ -15,12 +15,6 @@ namespace {
 
 using namespace quasilpv;  // NOLINT(google-build-using-namespace): this file is the program
 
-constexpr const char* kFooter =
-    "Example:\n"
-    "  qlpv-controller --artifact artifact.json --trajectory trajectory.json --session 7 --record controller.csv &\n"
-    "  qlpv-simulator --artifact artifact.json --scenario scenario.json --session 7 --record plant.csv\n\n"
-    "Exit codes: 0 done, 2 bad input, 3 fault stop, 4 no real-time privilege, 5 no transport, 6 plant failure.";
-
 struct Options {
   CommonOptions common;
   std::string scenario;
@@ -29,7 +23,7 @@ struct Options {
 };
 
 void declare_all(CLI::App& app, Options& options) {
-  app.footer(kFooter);
+  app.footer(help_footer(", 6 plant failure"));
   declare(app, options.common);
   app.add_option("--scenario", options.scenario, "the experiment, true plant included")->required();
   app.add_option("--hold-s", options.run.hold_s, "realtime: the watchdog brakes after so long without a command")
@@ -99,15 +93,10 @@ const char* fault_stop_reason(const PlantRunReport& run) {
 
 int exit_code(const PlantRunReport& run, const CommonOptions& options) {
   if (run.end == PlantRunEnd::kControllerNeverHeard) {
-    throw TransportError("no command of session " + std::to_string(options.session) + " on " + options.url +
-                         " within " + std::to_string(options.timeout_s) + " s: is qlpv-controller running?");
+    throw_never_heard(options, "command", "qlpv-controller");
   }
   const char* reason = fault_stop_reason(run);
-  if (reason == nullptr) {
-    return kExitDone;
-  }
-  std::cerr << "qlpv-simulator: fault stop: " << reason << ", last sample " << run.samples << '\n';
-  return kExitFaultStop;
+  return reason == nullptr ? kExitDone : report_fault_stop("qlpv-simulator", reason, run.samples);
 }
 
 int run(const CLI::App& app, Options& options) {
@@ -120,7 +109,7 @@ int run(const CLI::App& app, Options& options) {
   }
   PlantSession session(scenario, artifact.sample_period_s());
   const bool realtime = apply_priority(app, common);
-  const WireIdentity identity{common.session, artifact.hash_prefix(), artifact.joints()};
+  const WireIdentity identity = identity_of(common, artifact);
   LcmLink link(Side::kPlant, identity, common.url, common.allow_network);
 
   options.run.pace = common.pace;

@@ -8,6 +8,7 @@
 #include <map>
 #include <string>
 
+#include "quasilpv/artifact.hpp"
 #include "quasilpv/errors.hpp"
 #include "quasilpv/lcm_link.hpp"
 #include "quasilpv/pacer.hpp"
@@ -30,6 +31,16 @@ struct CommonOptions {
   bool json = false;
 };
 
+/// The end of the help: one run as two commands, and the exit codes.
+inline std::string help_footer(const std::string& more_exit_codes = "") {
+  return "Example:\n"
+         "  qlpv-controller --artifact artifact.json --trajectory trajectory.json --session 7 --record controller.csv "
+         "&\n"
+         "  qlpv-simulator --artifact artifact.json --scenario scenario.json --session 7 --record plant.csv\n\n"
+         "Exit codes: 0 done, 2 bad input, 3 fault stop, 4 no real-time privilege, 5 no transport" +
+         more_exit_codes + ".";
+}
+
 inline void declare(CLI::App& app, CommonOptions& options) {
   static const std::map<std::string, Pace> kPaces{{"lockstep", Pace::kLockStep}, {"realtime", Pace::kRealTime}};
   app.add_option("--artifact", options.artifact, "the controller, JSON or CBOR")->required();
@@ -47,6 +58,24 @@ inline void declare(CLI::App& app, CommonOptions& options) {
       ->check(CLI::PositiveNumber.description(""))
       ->capture_default_str();
   app.add_flag("--json", options.json, "report as one line of JSON");
+}
+
+/// How this side signs its messages.
+inline WireIdentity identity_of(const CommonOptions& options, const Artifact& artifact) {
+  return {options.session, artifact.hash_prefix(), artifact.joints()};
+}
+
+/// Throws the TransportError of a run in which the other side was never heard.
+[[noreturn]] inline void throw_never_heard(const CommonOptions& options, const std::string& message,
+                                           const std::string& other_side) {
+  throw TransportError("no " + message + " of session " + std::to_string(options.session) + " on " + options.url +
+                       " within " + std::to_string(options.timeout_s) + " s: is " + other_side + " running?");
+}
+
+/// Says why a run counts as stopped by a fault. Returns its exit code.
+inline int report_fault_stop(const std::string& program, const std::string& reason, std::int64_t last_sample) {
+  std::cerr << program << ": fault stop: " << reason << ", last sample " << last_sample << '\n';
+  return kExitFaultStop;
 }
 
 /// No real-time privilege although it was required (exit code 4).
