@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+import scipy.linalg
 
 from quasilpv.conditions.condition import FloatArray
 from quasilpv.conditions.extended import extended_state
@@ -103,11 +104,29 @@ def gains_on_differential(
     return np.asarray(-np.linalg.solve(normal[:, :, :m], normal[:, :, m:]))
 
 
+def completed(lyapunov: FloatArray, model: PolytopicModel) -> FloatArray:
+    """P with the part that `unactuated_rows` does not see, ``Z B``, replaced so that P is invertible.
+
+    ``Z N`` has full column rank, because ``N' [-E_1 A_12; 0 A_22] Z N`` is definite; the columns of B are sent to its
+    orthogonal complement. A gain exists for every such P.
+    """
+    q, N = model.differential, unactuated(model).astype(float)
+    Z = lyapunov[q:, q:]
+    seen = Z @ N
+    complement = np.linalg.qr(seen, mode="complete")[0][:, N.shape[1] :] if seen.size else np.eye(len(Z))
+    scale = np.linalg.norm(seen, 2) if seen.size else np.linalg.norm(lyapunov, 2)
+    across = scipy.linalg.orth(model.system.B.constant)
+    whole = lyapunov.copy()
+    whole[q:, q:] = seen @ np.linalg.pinv(N) + scale * complement @ across.T
+    return whole
+
+
 def gains_on_extended(extended: FloatArray, inputs: FloatArray, lyapunov: FloatArray) -> FloatArray:
     """Gains on the whole extended state: ``He(A_i P + B M_i)`` becomes block diagonal and negative.
 
     In the coordinates of ``[N, B (B'B)^-1]`` the rows of B are those of M_i, which removes what couples them to the
-    others and makes the own block ``-c I``, c the mean size of ``A_i P``.
+    others and makes the own block ``-c I``, c the mean size of all ``A_i P``. The gains are affine in A_i, so that at
+    every z their weighted sum does the same to ``A(z) P``.
 
     Args:
         extended, lyapunov: as in `gains_on_differential`.
@@ -121,6 +140,5 @@ def gains_on_extended(extended: FloatArray, inputs: FloatArray, lyapunov: FloatA
     basis = np.hstack([orthonormal[:, m:], inputs @ np.linalg.inv(inputs.T @ inputs)])
     product = extended @ lyapunov
     Q = basis.T @ (product + product.transpose(0, 2, 1)) @ basis
-    size = np.abs(product).mean(axis=(1, 2))[:, None, None]
-    own = -0.5 * (Q[:, -m:, -m:] + size * np.eye(m))
+    own = -0.5 * (Q[:, -m:, -m:] + np.abs(product).mean() * np.eye(m))
     return np.asarray(np.concatenate([-Q[:, -m:, :-m], own], axis=2) @ np.linalg.inv(basis))

@@ -15,6 +15,7 @@ from quasilpv.conditions.blocks import double_sum
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
+    FloatArray,
     Form,
     Options,
     Statement,
@@ -22,7 +23,7 @@ from quasilpv.conditions.condition import (
     polytopic_gain,
     shared_gains,
 )
-from quasilpv.conditions.elimination import gains_are_free, gains_on_extended, unactuated_rows
+from quasilpv.conditions.elimination import completed, gains_are_free, gains_on_extended, unactuated_rows
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states
 from quasilpv.conditions.slack import Slack
 from quasilpv.lmi import Expression, Problem, Variable
@@ -40,19 +41,11 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     P = extended_lyapunov(P11, P21, P22)
     problem = Problem()
     problem.positive("P11", P11)
+    free = bool(model.inputs) and gains_are_free(model)
     slackless = len(model.polytope.blocks) == 1 or options.slack is Slack.NONE
-    if options.form is Form.REDUCED and slackless and gains_are_free(model) and model.inputs:
+    if options.form is Form.REDUCED and slackless and free:
         unactuated_rows(problem, model, P, options.decay_rate)
-
-        def recovered(values: Values) -> Feedback:
-            extended = np.stack(extended_states(model, options.decay_rate)).astype(float)
-            value = P.at(values).astype(float)
-            M = gains_on_extended(extended, extended_inputs(model)[0].astype(float), value)
-            K = M @ np.linalg.inv(value)
-            return Feedback(values[P11], lambda z: np.asarray(model.polytope.evaluate(K, z)))
-
-        return Statement(problem, recovered)
-
+        return Statement(problem, lambda values: _recovered(model, options, values[P11], P.at(values).astype(float)))
     M = shared_gains(model, q + n, "M")
     A, B = extended_states(model, options.decay_rate), extended_inputs(model)
 
@@ -62,10 +55,21 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     slacks = double_sum(problem, "Upsilon", entry, count, model.polytope.block_index, slack=options.slack)
 
     def feedback(values: Values) -> Feedback:
-        inverse = np.linalg.inv(P.at(values).astype(float))
-        return Feedback(values[P11], polytopic_gain(model, M, values, inverse))
+        value = P.at(values).astype(float)
+        if free:
+            return _recovered(model, options, values[P11], value)
+        return Feedback(values[P11], polytopic_gain(model, M, values, np.linalg.inv(value)))
 
     return Statement(problem, feedback, slacks)
+
+
+def _recovered(model: PolytopicModel, options: Options, lyapunov: FloatArray, P: FloatArray) -> Feedback:
+    """The law of a solution for a constant B: the gains of a solver may come with a singular P, those of P never do."""
+    extended = np.stack(extended_states(model, options.decay_rate)).astype(float)
+    whole = completed(P, model)
+    M = gains_on_extended(extended, extended_inputs(model)[0].astype(float), whole)
+    K = M @ np.linalg.inv(whole)
+    return Feedback(lyapunov, lambda z: np.asarray(model.polytope.evaluate(K, z)))
 
 
 CONDITION = Condition(
