@@ -25,7 +25,7 @@ from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
 from quasilpv.scenarios import Sensors
 from quasilpv.synthesis import Specification
-from quasilpv.synthesis.hinf_tracking import DECAY, FRICTION_NM_S, unknown_torques
+from quasilpv.synthesis.hinf_tracking import FRICTION_NM_S, unknown_torques
 from quasilpv.synthesis.torque_schedule import full_schedule
 from quasilpv.systems.registry import robot
 from reference.mutants import BLOCKS, Mutant
@@ -202,7 +202,7 @@ MUTANTS = (
     Mutant("gain limit, P", "P - beta * states", "P"),
     Mutant("sum", 'problem.negative(f"{name} {i}"', 'i and problem.negative(f"{name} {i}"', BLOCKS),
 )
-BANDWIDTH, MUTANT_FRICTION = 24.0, 60.0
+BANDWIDTH, MUTANT_DECAY, MUTANT_FRICTION = 24.0, 0.3, 60.0
 
 
 def shipped(module: Any) -> Document:
@@ -212,7 +212,7 @@ def shipped(module: Any) -> Document:
     unknown.radius[-arm.model.joints :] = MUTANT_FRICTION
     unit = 4.0
     condition = module.reduced_tracking_condition(
-        chosen.inertia / unit, unknown.in_units(BANDWIDTH, unit), decay=DECAY, gain_limit=60.0
+        chosen.inertia / unit, unknown.in_units(BANDWIDTH, unit), decay=MUTANT_DECAY, gain_limit=60.0
     )
     solution = condition.problem.solve_inside(0.02)
     assert solution.values, "this error leaves nothing to ship: plant another"

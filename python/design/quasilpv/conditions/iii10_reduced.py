@@ -9,7 +9,7 @@ The theorem's slack matrices L, R only serve to separate A(z) from E(z) in ``He(
 constant but for the unknown terms, so this is affine in z without them, save for ``2 alpha E(z) P E(z)'``, which is
 convex: the inequality at the vertices implies it everywhere (Jensen). For one unknown number with a factor of rank
 one, the theorem's slack matrix of that premise is ``tau r^2 b b' + c c' / tau`` without loss (Petersen 1987), which
-leaves one unknown tau_k for each. Derivation: ``docs/concepts/reduced-forms.md``.
+leaves one unknown tau_k for each. Derivation: ``docs/concepts/hinf-tracking.md``.
 """
 
 from __future__ import annotations

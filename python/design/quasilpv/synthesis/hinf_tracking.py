@@ -38,16 +38,16 @@ FloatArray = npt.NDArray[np.float64]
 FRICTION_NM_S = 10.0
 """Largest viscous friction coefficient of a joint (Dehak 2022, III.3.3)."""
 
-DECAY = 0.3
+DECAY = 0.4
 """Decay rate over the bandwidth."""
 
 BACK_OFF = 0.05
 
 # Search grid: gain limits in the units of the bandwidth and of the mean inertia, bandwidths in units of the sample
 # rate, filter of the measured speed in sample periods.
-GAIN_LIMITS = (60.0, 90.0, 120.0, 160.0)
+GAIN_LIMITS = (120.0, 160.0, 200.0, 240.0)
 BANDWIDTHS = tuple(float(w) for w in np.geomspace(0.006, 0.016, 21))
-FILTER_TIMES = (1.0, 2.0)
+FILTER_TIMES = (1.5, 2.0)
 
 
 def unknown_torques(robot: Robot) -> UnknownTorques:
