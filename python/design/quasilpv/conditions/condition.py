@@ -39,6 +39,8 @@ class Options:
         decay_rate: alpha >= 0 with ``V' <= -2 alpha V``, 1/s; conditions without one refuse a positive value.
         form: see `Form`.
         window_s: length tau of the moving window of delayed laws, s; None is the limit tau -> 0.
+        common: multipliers and the rest of the Lyapunov matrix without index (L, R, W, Z), as in Dehak 2022, Example
+            II.8: fewer unknowns, more conservative. Conditions without multipliers are not affected.
 
     Raises:
         InputError: a number is out of range.

@@ -80,14 +80,12 @@ def require_delayed(model: PolytopicModel, options: Options, condition: str) -> 
         condition: its id.
 
     Raises:
-        InputError: unknown premises, whose weights the law would need, a decay rate, or a window that is not positive.
+        InputError: unknown premises, whose weights the law would need, or a decay rate.
     """
     if unknown_premises(model.system):
         raise InputError(f"condition {condition}", model.system.name, "unknown premises", "a system without")
     if options.decay_rate:
         raise InputError(f"condition {condition}", "decay rate", options.decay_rate, "0, the theorem has none")
-    if options.window_s is not None and not options.window_s > 0.0:
-        raise InputError(f"condition {condition}", "window_s", options.window_s, "a number > 0, or none for the limit")
 
 
 def delayed_feedback(

@@ -15,11 +15,14 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
+import numpy.typing as npt
 
 from quasilpv.lmi import Expression, block, zeros
 from quasilpv.lmi.expressions import Operand
 from quasilpv.polytopes import PolytopicModel
 from quasilpv.polytopes.model import ExactMatrix, Vertices
+
+FloatArray = npt.NDArray[np.float64]
 
 
 def extended_state(E: ExactMatrix, A: ExactMatrix, differential: int, decay_rate: float = 0.0) -> ExactMatrix:
@@ -42,6 +45,21 @@ def extended_input(B: ExactMatrix, differential: int) -> ExactMatrix:
 def extended_states(model: PolytopicModel, decay_rate: float = 0.0) -> Vertices:
     """Vertices of ``A_e + alpha E_o``; equal ones are one object."""
     return model.vertices(lambda E, A, B: extended_state(E, A, model.differential, decay_rate))
+
+
+def extended_states_in_double(model: PolytopicModel, decay_rate: float = 0.0) -> FloatArray:
+    """`extended_states` in double, (count, N, N), for the recovery of gains."""
+    q, n = model.differential, model.order
+    E, A = (
+        model.polytope.vertices(matrix.constant, matrix.coefficients) for matrix in (model.system.E, model.system.A)
+    )
+    extended = np.zeros((model.vertex_count, q + n, q + n))
+    extended[:, :q, :q] = decay_rate * np.eye(q)
+    extended[:, :q, q : 2 * q] = np.eye(q)
+    extended[:, q:, :q] = A[:, :, :q]
+    extended[:, q : 2 * q, q : 2 * q] = -E[:, :q, :q]
+    extended[:, q:, 2 * q :] = A[:, :, q:]
+    return extended
 
 
 def extended_inputs(model: PolytopicModel) -> Vertices:

@@ -40,6 +40,7 @@ from quasilpv.conditions.extended import (
     extended_inputs,
     extended_lyapunov,
     extended_states,
+    extended_states_in_double,
     on_differential,
 )
 from quasilpv.conditions.slack import Slack
@@ -113,7 +114,7 @@ def without_gains(model: PolytopicModel, options: Options) -> Statement:
     def feedback(values: Values) -> Feedback:
         if model.inputs == 0:
             return Feedback(values[P.P11], None)
-        extended = np.stack(extended_states(model, options.decay_rate)).astype(float)
+        extended = extended_states_in_double(model, options.decay_rate)
         M = gains_on_differential(extended, model.system.B.constant, P.value(values), q)
         vertices = M @ on_state(values[P.P11], model.order)
         return Feedback(values[P.P11], lambda z: np.asarray(model.polytope.evaluate(vertices, z)))

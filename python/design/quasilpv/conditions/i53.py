@@ -24,7 +24,7 @@ from quasilpv.conditions.condition import (
     shared_gains,
 )
 from quasilpv.conditions.elimination import completed, gains_are_free, gains_on_extended, unactuated_rows
-from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states
+from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, extended_states_in_double
 from quasilpv.conditions.slack import Slack
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.expressions import as_expression
@@ -65,7 +65,7 @@ def build(model: PolytopicModel, options: Options) -> Statement:
 
 def _recovered(model: PolytopicModel, options: Options, lyapunov: FloatArray, P: FloatArray) -> Feedback:
     """The law of a solution for a constant B: the gains of a solver may come with a singular P, those of P never do."""
-    extended = np.stack(extended_states(model, options.decay_rate)).astype(float)
+    extended = extended_states_in_double(model, options.decay_rate)
     whole = completed(P, model)
     M = gains_on_extended(extended, extended_inputs(model)[0].astype(float), whole)
     K = M @ np.linalg.inv(whole)

@@ -29,7 +29,7 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     but that of D_k in the limit.
 
     Raises:
-        InputError: unknown premises, a decay rate, or a window that is not positive.
+        InputError: unknown premises, or a decay rate.
     """
     require_delayed(model, options, "II.7")
     q, n, count = model.differential, model.order, model.vertex_count

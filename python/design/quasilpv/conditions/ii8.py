@@ -36,7 +36,7 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     Unknowns ``P = P' > 0`` and D_k symmetric (n, n), L_jkm, R_jkm (n, n) and F_jkm (m, n); no k in the limit.
 
     Raises:
-        InputError: algebraic states, unknown premises, a decay rate, or a window that is not positive.
+        InputError: algebraic states, unknown premises, or a decay rate.
     """
     require_regular(model, "II.8")
     require_delayed(model, options, "II.8")
