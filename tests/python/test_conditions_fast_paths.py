@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from closed_loops import decided, worst_rate
+from quasilpv.conditions import i2
 from quasilpv.conditions.condition import Form, Options
 from quasilpv.conditions.registry import condition
 from quasilpv.conditions.slack import Slack
@@ -93,6 +94,17 @@ def test_reduced_and_published_forms_agree_and_their_laws_hold(
         reduced, published = (_decide(name, model, options, form) for form in (Form.REDUCED, Form.PUBLISHED))
         assert reduced == published, f"seed {seed}"
         feasible += reduced
+    assert 0 < feasible < 6
+
+
+@pytest.mark.parametrize("slack", [Slack.NONE, Slack.THESIS])
+def test_a_double_sum_with_constant_input_is_a_single_one(slack: Slack) -> None:
+    feasible = 0
+    for seed in range(6):
+        model = polytopic_model(regular(seed), "per-premise")
+        single, double = (decided(i2.with_gains(model, Options(slack=slack), single=s).problem) for s in (True, False))
+        assert single.outcome == double.outcome
+        feasible += single.feasible
     assert 0 < feasible < 6
 
 

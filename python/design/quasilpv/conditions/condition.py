@@ -174,6 +174,15 @@ def on_state(lyapunov: FloatArray, order: int) -> FloatArray:
     return np.hstack([inverse, np.zeros((len(inverse), order - len(inverse)))])
 
 
+def is_single_sum(model: PolytopicModel, slack: Slack) -> bool:
+    """Whether a double sum over ``X_ij = Y_i + Z_j`` is a single one: ``X_ij + X_ji = X_ii + X_jj``.
+
+    The entries have that form when B is constant, and slack matrices do unless they carry both indices. This is how the
+    published tables count.
+    """
+    return model.constant_input and (len(model.polytope.blocks) == 1 or slack in {Slack.NONE, Slack.THESIS})
+
+
 def single_sum_blocks(model: PolytopicModel, slack: Slack) -> npt.NDArray[np.intp] | None:
     """Blocks of the vertices for the slack of a single sum, in which all families are the same; None for none."""
     return None if slack is Slack.NONE else model.polytope.block_index

@@ -7,8 +7,8 @@ With the extended form (`extended`), ``V = x_d' P_11^-1 x_d`` and ``F_j = M_j P_
 which is required as a double sum (`blocks.double_sum`; the printed constant 2/(r-1) is unsound: N vertices need
 2/(N-1)).
 
-Reduced form, B constant: ``X_ij + X_ji = X_ii + X_jj``, so that the inequalities of i = j imply the others, and slack
-T_b(i) + S_b(j) is one matrix T_b + S_b per block. The single sum that remains is written
+If B is constant, ``X_ij + X_ji = X_ii + X_jj``: the inequalities of i = j imply the others, slack T_b(i) + S_b(j) is
+one matrix T_b + S_b per block, and a single sum is left. In the reduced form it is written
 
 - without slack, or with a single block: without the gains (`elimination`);
 - with one block per premise and slack: as one D-G scaled inequality (`cube`), gains ``M(z) = M_c + sum_p d_p M_p``.
@@ -29,6 +29,7 @@ from quasilpv.conditions.condition import (
     Options,
     Statement,
     Values,
+    is_single_sum,
     on_state,
     polytopic_gain,
     shared_gains,
@@ -73,13 +74,16 @@ def build(model: PolytopicModel, options: Options) -> Statement:
             return without_gains(model, options)
         if gains_are_free(model) and is_cube(model, options.slack) and options.slack is Slack.THESIS:
             return _as_cube(model, options)
-        if single_block or options.slack in {Slack.NONE, Slack.THESIS}:
-            return _with_gains(model, options, single=True)
-    return _with_gains(model, options, single=False)
+    return with_gains(model, options, single=is_single_sum(model, options.slack))
 
 
-def _with_gains(model: PolytopicModel, options: Options, *, single: bool) -> Statement:
-    """The condition as published, or its single sum."""
+def with_gains(model: PolytopicModel, options: Options, *, single: bool) -> Statement:
+    """Theorem I.2 with all its unknowns.
+
+    Args:
+        model, options: of the statement.
+        single: write the double sum as a single one, see `is_single_sum`.
+    """
     q, n, count = model.differential, model.order, model.vertex_count
     P = _Lyapunov(model)
     M = shared_gains(model, q, "M")

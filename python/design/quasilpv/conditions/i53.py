@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from quasilpv.conditions.blocks import double_sum
+from quasilpv.conditions.blocks import double_sum, single_sum
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
@@ -20,8 +20,10 @@ from quasilpv.conditions.condition import (
     Options,
     Statement,
     Values,
+    is_single_sum,
     polytopic_gain,
     shared_gains,
+    single_sum_blocks,
 )
 from quasilpv.conditions.elimination import completed, gains_are_free, gains_on_extended, unactuated_rows
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, extended_states_in_double
@@ -52,7 +54,11 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     def entry(i: int, j: int) -> Expression:
         return as_expression(A[i] @ P + B[i] @ M[j])
 
-    slacks = double_sum(problem, "Upsilon", entry, count, model.polytope.block_index, slack=options.slack)
+    if is_single_sum(model, options.slack):
+        blocks = single_sum_blocks(model, options.slack)
+        slacks = single_sum(problem, "Upsilon", lambda i: entry(i, i), count, blocks)
+    else:
+        slacks = double_sum(problem, "Upsilon", entry, count, model.polytope.block_index, slack=options.slack)
 
     def feedback(values: Values) -> Feedback:
         value = P.at(values).astype(float)

@@ -9,13 +9,14 @@ indices of a double sum:
 (A_i and B_i extended, A_i with alpha E_o). The slack T_b(i) + S_b(j) - mean has mean zero; only T_b + S_b counts, since
 X_ij and X_ji appear in one sum.
 
+With `Options.common` (L, R, W, Z without index) and B constant, ``X_ij + X_ji = X_ii + X_jj`` leaves a single sum.
+
 Reduced form:
 
 - ``W_ij = W_ji`` and ``Z_ij = Z_ji``, since the sums hold ``P_ij + P_ji`` only.
-- with `Options.common` (L, R, W, Z without index) and B constant: ``X_ij + X_ji = X_ii + X_jj`` leaves a single sum.
-  Without slack, or with a single block, that is Theorem I.2 without gains: ``[I A_i]`` times the inequality times its
-  transpose is ``He(A_i P + B [F_i 0]) < 0``, and ``L = P``, ``R = rho I`` with small rho gives the converse. With one
-  block per premise and slack it is one D-G scaled inequality (`cube`).
+- the single sum, without slack or with a single block, is Theorem I.2 without gains: ``[I A_i]`` times the inequality
+  times its transpose is ``He(A_i P + B [F_i 0]) < 0``, and ``L = P``, ``R = rho I`` with small rho gives the converse.
+- the single sum with one block per premise and slack is one D-G scaled inequality (`cube`).
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from quasilpv.conditions.condition import (
     Options,
     Statement,
     Values,
+    is_single_sum,
     on_state,
     polytopic_gain,
     shared_gains,
@@ -81,8 +83,8 @@ def with_multipliers(
         P: the extended Lyapunov matrices.
     """
     q, n, count = model.differential, model.order, model.vertex_count
-    single = options.form is Form.REDUCED and options.common and model.constant_input
-    if single and is_cube(model, options.slack) and options.slack is Slack.THESIS and gains_are_free(model):
+    single = options.common and is_single_sum(model, options.slack)
+    if options.form is Form.REDUCED and single and is_cube(model, options.slack) and gains_are_free(model):
         return _as_cube(model, options, problem, V, P(0, 0))
     labels = [""] * count if options.common else [str(j) for j in range(count)]
     unknowns = {label: (Variable(f"L{label}", q + n), Variable(f"R{label}", q + n)) for label in labels}
@@ -95,7 +97,7 @@ def with_multipliers(
         return block([[A[i] @ L + B[i] @ on_differential(F[j], q, n), A[i] @ R], [P(i, j) - L, -R]])
 
     blocks = model.polytope.block_index
-    if single and (options.slack in {Slack.NONE, Slack.THESIS} or len(model.polytope.blocks) == 1):
+    if single:
         own = single_sum_blocks(model, options.slack)
         slacks = single_sum(problem, "Xi", lambda i: entry(i, i), count, own)
     else:

@@ -16,15 +16,17 @@ from __future__ import annotations
 from fractions import Fraction
 
 from quasilpv.conditions import matched
-from quasilpv.conditions.blocks import double_sum
+from quasilpv.conditions.blocks import double_sum, single_sum
 from quasilpv.conditions.condition import (
     Condition,
     Form,
     Options,
     Statement,
     descriptor_feedback,
+    is_single_sum,
     require_regular,
     shared_gains,
+    single_sum_blocks,
 )
 from quasilpv.lmi import Expression, Problem, Variable, block
 from quasilpv.polytopes import PolytopicModel
@@ -55,7 +57,11 @@ def build(model: PolytopicModel, options: Options) -> Statement:
 
     problem = Problem()
     problem.positive("P", P)
-    slacks = double_sum(problem, "Xi", entry, count, model.polytope.block_index, slack=options.slack)
+    if options.common and is_single_sum(model, options.slack):
+        blocks = single_sum_blocks(model, options.slack)
+        slacks = single_sum(problem, "Xi", lambda i: entry(i, i), count, blocks)
+    else:
+        slacks = double_sum(problem, "Xi", entry, count, model.polytope.block_index, slack=options.slack)
 
     return Statement(problem, descriptor_feedback(model, P, F), slacks)
 
