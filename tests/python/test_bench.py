@@ -6,11 +6,20 @@ import json
 import math
 import os
 import subprocess
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from bench_map import QUESTION, Timed, agreement, inequalities
+from bench_report import DisagreementError
+from bench_solvers import Conic, Cvxopt, Scs, decide_with
+
+from quasilpv.lmi import Problem, Variable, he
+from quasilpv.lmi.compiled import CompiledProblem, Layout
+from quasilpv.studies import Verdict
 
 ROOT = Path(__file__).parents[2]
 TOOLS = ROOT / "tools" / "bench"
@@ -67,6 +76,35 @@ def test_quantiles_of_the_step_are_ordered() -> None:
     values = {row["name"]: row["value"] for row in quick_rows("step")}
     p50, p99, p999 = (values[f"dob-acceleration step {quantile}"] for quantile in ("p50", "p99", "p99.9"))
     assert p50 <= p99 <= p999
+
+
+def test_the_map_is_compared_with_both_ways_of_writing_it_in_cvxpy_with_and_without_the_exact_check() -> None:
+    beside = {(row["name"].partition(": ")[2].partition(",")[0], row["against"]) for row in quick_rows("lmi")}
+    for way in ("certified", "solver only"):
+        assert {(way, "cvxpy, built anew"), (way, "cvxpy, compiled once (DPP)")} <= beside
+
+
+def test_when_the_statements_differ_in_a_verdict_expect_an_error_and_not_a_time() -> None:
+    ours, theirs = (Timed(1.0, verdicts) for verdicts in ((Verdict.FEASIBLE,), (Verdict.INFEASIBLE,)))
+    assert len(agreement({"certified": ours, "other": theirs}, same={})) == 2
+    with pytest.raises(DisagreementError, match="0 of 1"):
+        agreement({"certified": ours, "other": theirs}, same={"other": None})
+
+
+def test_the_inequalities_written_for_cvxpy_have_the_unknowns_of_the_library() -> None:
+    unknowns = sum(v.size for v in QUESTION.statement().problem.variables)
+    theirs = inequalities(1.0, 1.0).variables()
+    assert sum(v.shape[0] * (v.shape[0] + 1) // 2 if v.attributes["symmetric"] else v.size for v in theirs) == unknowns
+
+
+@pytest.mark.parametrize("load", [Scs, Cvxopt])
+def test_when_the_verdict_is_known_expect_every_other_solver_to_find_it(load: Callable[[Layout], Conic]) -> None:
+    for abscissa, verdict in ((-0.5, Verdict.FEASIBLE), (0.5, Verdict.INFEASIBLE)):
+        P, problem = Variable("P", 2, symmetric=True), Problem()
+        problem.positive("P", P)
+        problem.negative("decrease", he(np.array([[-1.0, 3.0], [0.0, abscissa]]) @ P))
+        compiled = CompiledProblem.of(problem)
+        assert decide_with(load(compiled.layout), compiled) is verdict
 
 
 @pytest.mark.parametrize("layer", ["step", "plant", "transport"])

@@ -1,4 +1,4 @@
-"""The sampled-chain conditions: direct assembly for Clarabel, and the same inequalities written in cvxpy."""
+"""Conditions by direct assembly for Clarabel, beside the same inequalities written in cvxpy, and large ones alone."""
 
 # cvxpy is only partly typed.
 # mypy: disable-error-code="attr-defined, no-untyped-call"
@@ -17,6 +17,7 @@ from unittest.mock import patch
 
 import cvxpy as cp
 import numpy as np
+from bench_map import measure_map
 from bench_report import DisagreementError, Report, Row, main, row
 
 from quasilpv.conditions.sampled_chains import (
@@ -30,6 +31,7 @@ from quasilpv.conditions.sampled_chains import (
     observer_gains,
 )
 from quasilpv.lmi import Outcome, Problem, Solution, clarabel_backend
+from quasilpv.studies import Question, Sweep
 
 SAMPLE_PERIOD_S = 1e-3
 LARGEST_RELATIVE_DIFFERENCE = 1e-4
@@ -160,7 +162,35 @@ def require_agreement(name: str, direct: Way, naive: Way) -> str:
     return text
 
 
+LARGE = (
+    ("I.2 of arm3, 4096 vertices", partial(Question, "arm3", "I.2", "ts")),
+    ("II.8 of ex-I.1, tau -> 0", partial(Question, "ex-I.1", "II.8")),
+)
+"""Questions that are timed alone: cvxpy would take minutes to compile them."""
+
+
+def measure_large(questions: Sequence[tuple[str, Callable[[], Question]]]) -> tuple[list[Row], list[str]]:
+    """Time from the equations of the system to the certified answer."""
+    rows, notes = [], []
+    for name, ask in questions:
+        start = process_time_ns()
+        answer = Sweep(ask(), ()).at({})
+        rows.append(row(f"{name}: stated, decided and certified", (process_time_ns() - start) * 1e-9, "s"))
+        known = "certified" if answer.certified else "not certified"
+        notes.append(f"{name}: {answer.verdict}, {known}; {answer.unknowns} unknowns, {answer.rows} rows as solved")
+    return rows, notes
+
+
 def measure(quick: bool) -> Report:
+    """Time everything; what is compared is first found to be the same problem."""
+    rows, notes = measure_chains(quick=quick)
+    for more_rows, more_notes in (measure_map(quick=quick), measure_large(LARGE[:1] if quick else LARGE)):
+        rows += more_rows
+        notes += more_notes
+    return Report(rows, notes, packages=("clarabel", "cvxpy", "scs", "cvxopt", "sdpa-python", "numpy", "scipy"))
+
+
+def measure_chains(*, quick: bool) -> tuple[list[Row], list[str]]:
     """Check that both ways find the same optimum, then time them."""
     rows: list[Row] = []
     notes = ["CPU time, one solve each, same solver and settings, one thread; statement: from the chain to expressions"]
@@ -171,8 +201,8 @@ def measure(quick: bool) -> Report:
         ours, theirs = median_cpu_ms([direct, naive], repetitions=1 if quick else 30)
         rows.append(row(f"{case.name}: assembly and solve", ours[1], "ms", (CVXPY, theirs[1])))
         rows.append(row(f"{case.name}: with its statement", sum(ours), "ms", (CVXPY, sum(theirs))))
-    return Report(rows, notes, packages=("clarabel", "cvxpy", "numpy", "scipy"))
+    return rows, notes
 
 
 if __name__ == "__main__":
-    main("lmi", "Sampled-chain conditions: direct assembly for Clarabel beside cvxpy.", measure)
+    main("lmi", "Conditions: direct assembly for Clarabel beside cvxpy and other solvers.", measure)
