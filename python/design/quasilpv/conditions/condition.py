@@ -41,6 +41,8 @@ class Options:
         window_s: length tau of the moving window of delayed laws, s; None is the limit tau -> 0.
         common: multipliers and the rest of the Lyapunov matrix without index (L, R, W, Z), as in Dehak 2022, Example
             II.8: fewer unknowns, more conservative. Conditions without multipliers are not affected.
+        sample_period_s: h of conditions on a sampled model, s; a decay rate alpha is then a contraction by
+            exp(-alpha h) per sample.
 
     Raises:
         InputError: a number is out of range.
@@ -51,6 +53,7 @@ class Options:
     form: Form = Form.REDUCED
     window_s: float | None = None
     common: bool = False
+    sample_period_s: float = 0.01
 
     def __post_init__(self) -> None:
         """Refuse numbers without a meaning."""
@@ -58,6 +61,8 @@ class Options:
             raise InputError("condition", "decay rate", self.decay_rate, "a finite number >= 0")
         if self.window_s is not None and not (isfinite(self.window_s) and self.window_s > 0.0):
             raise InputError("condition", "window", self.window_s, "a finite time > 0, or none for the limit")
+        if not (isfinite(self.sample_period_s) and self.sample_period_s > 0.0):
+            raise InputError("condition", "sample period", self.sample_period_s, "a finite time > 0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +73,14 @@ class Feedback:
         lyapunov: P with ``V = x_d' P^-1 x_d`` on the differential states, (q, q).
         gain: ``z -> K(z)``, (m, n) for ``u = K(z) x``, or (m, n + q) for ``u = K(z) (x_d, x_d', x_a)``; None for an
             analysis condition.
+        observer: ``z -> L(z)``, (n, outputs), of an observer condition, whose V is one of the estimation error.
         delayed: the law with memory that was designed, if it has one; `gain` is then the law without that follows.
     """
 
     lyapunov: FloatArray
     gain: Callable[[FloatArray], FloatArray] | None
     delayed: DelayedFeedback | None = None
+    observer: Callable[[FloatArray], FloatArray] | None = None
 
 
 @dataclass(frozen=True, eq=False)

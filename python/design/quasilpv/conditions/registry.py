@@ -2,7 +2,23 @@
 
 from __future__ import annotations
 
-from quasilpv.conditions import guerra2007, i1, i2, i3, i53, ii5, ii6, ii6_direct, ii7, ii8, iii9, tanaka_wang, ts_pj
+from quasilpv.conditions import (
+    guerra2007,
+    i1,
+    i2,
+    i3,
+    i53,
+    ii5,
+    ii6,
+    ii6_direct,
+    ii7,
+    ii8,
+    iii9,
+    sampled_feedback,
+    sampled_observer,
+    tanaka_wang,
+    ts_pj,
+)
 from quasilpv.conditions.condition import Condition
 from quasilpv.errors import InputError
 
@@ -23,6 +39,8 @@ CONDITIONS: dict[str, Condition] = {
         ts_pj.CONDITION,
         guerra2007.CONDITION,
         tanaka_wang.CONDITION,
+        sampled_feedback.CONDITION,
+        sampled_observer.CONDITION,
     )
 }
 
