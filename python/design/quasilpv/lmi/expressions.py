@@ -146,7 +146,7 @@ class Product:
 
     def times(self, factor: Any) -> Product:
         """``factor * term`` for a number."""
-        return Product(self.left * factor, self.variable, self.right, self.transposed)
+        return Product(_scaled(self.left, factor), self.variable, self.right, self.transposed)
 
     def placed(self, rows: slice, columns: slice, shape: tuple[int, int]) -> Product:
         """The term as a block of an otherwise zero matrix of the given shape."""
@@ -206,7 +206,7 @@ class ScalarProduct:
 
     def times(self, factor: Any) -> ScalarProduct:
         """``factor * term`` for a number."""
-        return ScalarProduct(self.coefficient * factor, self.variable)
+        return ScalarProduct(_scaled(self.coefficient, factor), self.variable)
 
     def placed(self, rows: slice, columns: slice, shape: tuple[int, int]) -> ScalarProduct:
         """The term as a block of an otherwise zero matrix of the given shape."""
@@ -239,6 +239,16 @@ def _placed(matrix: Matrix, rows: slice, columns: slice, shape: tuple[int, int])
     larger = _zero(*shape)
     larger[rows, columns] = matrix
     return larger
+
+
+def _scaled(matrix: Matrix, factor: Any) -> Matrix:
+    """``factor * matrix`` without the products of exact zeros, of which there are many."""
+    if matrix.dtype != object:
+        product: Matrix = matrix * factor
+        return product
+    scaled, places = matrix.copy(), np.nonzero(matrix)
+    scaled[places] = matrix[places] * factor
+    return scaled
 
 
 def _eye(size: int) -> Matrix:
@@ -293,7 +303,7 @@ class Expression:
                 raise ValueError(f"only a 1 x 1 expression multiplies a matrix with *, got {self.shape}")
             terms = tuple(_times_matrix(term, factor) for term in self.terms)
             return Expression(self.constant[0, 0] * factor, terms)
-        return Expression(self.constant * factor, tuple(term.times(factor) for term in self.terms))
+        return Expression(_scaled(self.constant, factor), tuple(term.times(factor) for term in self.terms))
 
     __rmul__ = __mul__
 

@@ -73,6 +73,7 @@ class Problem:
     def __init__(self) -> None:
         """Start with no inequality and the zero objective."""
         self._constraints: list[Constraint] = []
+        self._names: set[str] = set()
         self._objective: Expression | None = None
 
     @property
@@ -100,8 +101,9 @@ class Problem:
         square = as_expression(expression)
         if square.shape[0] != square.shape[1]:
             raise ValueError(f"{name}: an inequality is square, got {square.shape}")
-        if any(c.name == name for c in self._constraints):
+        if name in self._names:
             raise ValueError(f"{name}: there is already an inequality of that name")
+        self._names.add(name)
         self._constraints.append(Constraint(name, square))
 
     def negative(self, name: str, expression: Operand) -> None:
