@@ -27,6 +27,7 @@ LAYERS = (
     {"scenarios"},
     {"experiments"},
     {"figures"},
+    {"reproduction"},
     {"cli"},
     {"__main__"},
 )

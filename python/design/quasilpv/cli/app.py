@@ -17,6 +17,7 @@ from quasilpv.cli import (
     inspect,
     listing,
     region,
+    reproduce,
     robust,
     solve,
     synth,
@@ -57,6 +58,7 @@ Examples:
   design solve ex-I.1 --condition II.6 --set b=2.5
   design boundary ex-I.1 --condition II.6 --over b=0:30
   design region ex-I.1 --condition II.6 --x a=-8:8:17 --y b=-20:20:41
+  design reproduce --all --quick
 
 \b
 Exit codes:
@@ -103,6 +105,7 @@ app.command("solve")(solve.solve_command)
 app.command("boundary")(boundary.boundary_command)
 app.command("region")(region.region_command)
 app.command("complexity")(complexity.complexity_command)
+app.command("reproduce")(reproduce.reproduce_command)
 
 
 def run(arguments: Sequence[str]) -> int:

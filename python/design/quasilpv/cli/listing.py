@@ -6,6 +6,7 @@ from typing import Any
 
 from quasilpv.cli.console import JsonOption, print_json, print_table
 from quasilpv.conditions.registry import CONDITIONS
+from quasilpv.reproduction import ITEMS
 from quasilpv.scenarios import tracking_tasks
 from quasilpv.synthesis import CONTROLLERS
 from quasilpv.systems.catalogue import SYSTEMS
@@ -13,7 +14,7 @@ from quasilpv.systems.registry import robots
 
 
 def list_command(json: JsonOption = False) -> None:
-    """List robots, controllers, scenarios, systems and conditions.
+    """List robots, controllers, scenarios, systems, conditions and items of design reproduce.
 
     \b
     Example:
@@ -27,6 +28,7 @@ def list_command(json: JsonOption = False) -> None:
             {"id": name, "summary": kind.summary, "parameters": list(kind.parameters)} for name, kind in SYSTEMS.items()
         ],
         "conditions": [{"id": name, "summary": entry.summary} for name, entry in CONDITIONS.items()],
+        "items": [{"id": name, "summary": entry.title} for name, entry in ITEMS.items()],
     }
     if json:
         print_json(known)

@@ -17,7 +17,13 @@ COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, BLACK)
 INFEASIBLE_COLOUR = "#bdbdbd"
 
 
-def region_figure(regions: Sequence[Region], title: str | None = None) -> Figure:
+def region_figure(
+    regions: Sequence[Region],
+    title: str | None = None,
+    *,
+    labels: Sequence[str] = (),
+    axis_labels: tuple[str, str] | None = None,
+) -> Figure:
     """One or several maps over the same axes.
 
     One map shows its grid points by verdict; several are nested markers of decreasing size, largest region first, each
@@ -26,8 +32,12 @@ def region_figure(regions: Sequence[Region], title: str | None = None) -> Figure
     Args:
         regions: at least one, all with the same axes.
         title: default: system and condition of the first.
+        labels: of several maps; default: condition, representation and number of feasible points.
+        axis_labels: default: the names of the two parameters.
     """
     first = regions[0]
+    names = labels or [_label(region) for region in regions]
+    x_label, y_label = axis_labels or (first.x.name, first.y.name)
     with style():
         figure = new_figure(4.2, title or _title(first.question))
         axes = figure.add_subplot()
@@ -35,9 +45,9 @@ def region_figure(regions: Sequence[Region], title: str | None = None) -> Figure
             _verdicts(axes, first)
         else:
             for order, region in enumerate(regions):
-                _nested(axes, region, order, len(regions))
-        axes.set_xlabel(first.x.name)
-        axes.set_ylabel(first.y.name)
+                _nested(axes, region, names[order], order, len(regions))
+        axes.set_xlabel(x_label)
+        axes.set_ylabel(y_label)
         _frame(axes, first)
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
     return figure
@@ -57,11 +67,15 @@ def _verdicts(axes: Axes, region: Region) -> None:
     _boundary(axes, region, BLACK, "boundary")
 
 
-def _nested(axes: Axes, region: Region, order: int, total: int) -> None:
+def _label(region: Region) -> str:
+    feasible = sum(p.answer.verdict is Verdict.FEASIBLE for p in region.points)
+    return f"{region.question.condition}, {region.question.representation}: {feasible} points"
+
+
+def _nested(axes: Axes, region: Region, label: str, order: int, total: int) -> None:
     places = np.array([(p.x, p.y) for p in region.points if p.answer.verdict is Verdict.FEASIBLE]).reshape(-1, 2)
     size = _marker_size(region) * (1.6 - order / max(1, total - 1))
     colour = COLOURS[order % len(COLOURS)]
-    label = f"{region.question.condition}, {region.question.representation}: {len(places)} points"
     axes.plot(
         *places.T,
         linestyle="none",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from quasilpv.conditions.condition import Form
+from quasilpv.conditions.condition import Form, Statement
+from quasilpv.lmi.problem import Constraint
 from quasilpv.studies.question import Question
 
 
@@ -41,11 +43,22 @@ def count(question: Question) -> Complexity:
         InputError: the condition or the representation does not apply to the system.
     """
     published = replace(question, options=replace(question.options, form=Form.PUBLISHED))
-    statement = published.statement()
+    return measured(published.statement(), published.model().vertex_count)
+
+
+def measured(statement: Statement, vertices: int, constraints: Sequence[Constraint] | None = None) -> Complexity:
+    """Sizes of a statement.
+
+    Args:
+        statement: as built.
+        vertices: of the representation.
+        constraints: those of its inequalities that count; all of them by default.
+    """
     slack = sum(variable.size for variable in statement.slacks)
-    orders = [constraint.expression.shape[0] for constraint in statement.problem.constraints]
+    counted = statement.problem.constraints if constraints is None else constraints
+    orders = [constraint.expression.shape[0] for constraint in counted]
     return Complexity(
-        vertices=published.model().vertex_count,
+        vertices=vertices,
         unknowns=sum(variable.size for variable in statement.problem.variables) - slack,
         slack_unknowns=slack,
         inequalities=len(orders),

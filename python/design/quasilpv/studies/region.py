@@ -126,13 +126,13 @@ class Task:
 
     Attributes:
         question: of the map.
-        swept: names of the two parameters.
+        swept: names of the parameters that change.
         place: their values.
     """
 
     question: Question
-    swept: tuple[str, str]
-    place: tuple[float, float]
+    swept: tuple[str, ...]
+    place: tuple[float, ...]
 
 
 Solver: TypeAlias = Callable[[Sequence[Task]], Iterable[Answer]]
@@ -155,7 +155,7 @@ def solve_task(task: Task) -> Answer:
 
 
 @lru_cache(maxsize=4)
-def _sweep(question: Question, swept: tuple[str, str]) -> Sweep:
+def _sweep(question: Question, swept: tuple[str, ...]) -> Sweep:
     return Sweep(question, swept)
 
 

@@ -1,0 +1,44 @@
+"""The items known by id: one line per file, in the order of the source."""
+
+from __future__ import annotations
+
+from quasilpv.errors import InputError
+from quasilpv.reproduction import (
+    chapter_one,
+    chapter_three,
+    chapter_two_analysis,
+    chapter_two_design,
+    complexity_growth,
+    complexity_tables,
+    conservatism,
+    nonquadratic,
+    overbounding,
+)
+from quasilpv.reproduction.item import Item
+
+ITEMS: dict[str, Item] = {
+    entry.id: entry
+    for module in (
+        chapter_one,
+        overbounding,
+        complexity_growth,
+        chapter_two_analysis,
+        chapter_two_design,
+        nonquadratic,
+        chapter_three,
+        complexity_tables,
+        conservatism,
+    )
+    for entry in module.ITEMS
+}
+
+
+def item(name: str) -> Item:
+    """The item of that id.
+
+    Raises:
+        InputError: there is none; the message lists those there are.
+    """
+    if name not in ITEMS:
+        raise InputError("reproduction", "item", name, f"one of {', '.join(ITEMS)}")
+    return ITEMS[name]

@@ -1,0 +1,108 @@
+"""Computing items one after the other, each kept as soon as it is done."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from quasilpv.artifact.files import write_atomically
+from quasilpv.errors import InputError
+from quasilpv.figures.style import save
+from quasilpv.reproduction.item import Effort, Item, ItemResult
+from quasilpv.reproduction.report import markdown_table
+
+RESULTS, REPORT = "results.json", "results.md"
+
+
+def reproduce(
+    items: Sequence[Item],
+    effort: Effort,
+    out: Path,
+    *,
+    begin: Callable[[str], None] = lambda _: None,
+    end: Callable[[], None] = lambda: None,
+) -> list[Mapping[str, Any]]:
+    """Compute items and write figures, ``<id>.json`` each, and all current rows as ``results.json``, ``results.md``.
+
+    An item whose result is already in the folder, computed with the same effort from the same code, is not computed
+    again: an interrupted run goes on where it stopped.
+
+    Args:
+        items: which.
+        effort: how fine.
+        out: folder; made if it is missing.
+        begin, end: called around every item.
+
+    Returns:
+        One row per item, see `ItemResult.to_document`.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    rows: list[Mapping[str, Any]] = []
+    code = _code_digest()
+    _write_results(out, rows, code)  # a folder that cannot be written is found before anything is computed
+    for one in items:
+        begin(one.id)
+        row = _kept(out / f"{one.id}.json", effort, code)
+        if row is None:
+            row = {**_computed(one, effort, out), "effort": effort.value, "code": code}
+            write_atomically({out / f"{one.id}.json": _text(row)})
+        rows.append(row)
+        _write_results(out, rows, code)
+        end()
+    return rows
+
+
+def _computed(one: Item, effort: Effort, out: Path) -> dict[str, Any]:
+    start = time.perf_counter()
+    finding = one.compute(effort)
+    result = ItemResult(one, finding, time.perf_counter() - start)
+    for name, figure in finding.figures.items():
+        save(figure, out / (f"{one.id}-{name}" if name else one.id))
+    return result.to_document()
+
+
+def _write_results(out: Path, rows: Sequence[Mapping[str, Any]], code: str) -> None:
+    """Rows of earlier runs of the same code, replaced by or followed by those of this one."""
+    known = {row["id"]: row for row in [*_rows(out / RESULTS), *rows] if row["code"] == code}
+    merged = list(known.values())
+    write_atomically({out / RESULTS: _text(merged), out / REPORT: markdown_table(merged).encode()})
+
+
+def _kept(path: Path, effort: Effort, code: str) -> Mapping[str, Any] | None:
+    """The row of an earlier run, if it is of the same effort and code."""
+    rows = _rows(path)
+    return rows[0] if rows and (rows[0]["effort"], rows[0]["code"]) == (effort.value, code) else None
+
+
+def _rows(path: Path) -> list[Mapping[str, Any]]:
+    """What a file of this program holds, nothing if there is none."""
+    if not path.exists():
+        return []
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        rows: list[Mapping[str, Any]] = content if isinstance(content, list) else [content]
+        if not all(isinstance(row[name], str) for row in rows for name in ("id", "effort", "code")):
+            raise ValueError("not text")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        expected = "a result of this program, or no file"
+        raise InputError(str(path), "file", f"{type(error).__name__}: {error}", expected) from None
+    return rows
+
+
+def _code_digest() -> str:
+    """SHA-256 over the sources of the package: a change anywhere makes every kept result stale."""
+    root = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        digest.update(f"{path.relative_to(root)}\0".encode() + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def _text(value: Any) -> bytes:
+    return (json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False) + "\n").encode()
