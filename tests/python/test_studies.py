@@ -231,6 +231,8 @@ class TestCommands:
             (("boundary", "ex-I.1", "-c", "II.6", "--over", "b=0:1", "--tolerance", "2"), "tolerance"),
             (("region", "ex-I.1", "-c", "II.6", "--x", "a=0:1:2.5", "--y", "b=0:1:2"), "whole number"),
             (("complexity", "ex-I.9", "-c", "II.6"), "ex-I.1"),
+            (("solve", "arm3", "-c", "II.5", "--representation", "ts"), "fewer vertices"),
+            (("solve", "ex-I.1", "-c", "II.8", "--window-s", "0"), "window"),
         ],
     )
     def test_bad_input_is_one_line_and_exit_code_2(self, arguments: tuple[str, ...], words: str) -> None:

@@ -8,13 +8,16 @@ import typer
 
 from quasilpv.cli.console import JsonOption, print_json
 from quasilpv.cli.parameters import (
+    CommonOption,
     ConditionOption,
     DecayOption,
     FormOption,
     RepresentationOption,
+    SampleOption,
     SetOption,
     SlackOption,
     SystemArgument,
+    WindowOption,
     interval,
     question,
 )
@@ -34,6 +37,9 @@ def boundary_command(
     parameters: SetOption = None,
     decay: DecayOption = 0.0,
     form: FormOption = Form.REDUCED,
+    common: CommonOption = False,
+    window_s: WindowOption = None,
+    sample_period_s: SampleOption = Options.sample_period_s,
     tolerance: Annotated[float, typer.Option("--tolerance", help="Relative width to stop at.")] = RELATIVE_TOLERANCE,
     json: JsonOption = False,
 ) -> int:
@@ -45,7 +51,7 @@ def boundary_command(
     Example:
       design boundary ex-I.1 --condition II.6 --set a=1 --over b=0:30
     """
-    options = Options(slack=slack, decay_rate=decay, form=form)
+    options = Options(slack, decay, form, window_s=window_s, common=common, sample_period_s=sample_period_s)
     searched = interval(over, "--over")
     found = find_boundary(question(system, condition, representation, parameters, options), searched, tolerance)
     if json:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_table
-from quasilpv.cli.parameters import RepresentationOption, SetOption, SlackOption, SystemArgument, question
+from quasilpv.cli.parameters import CommonOption, RepresentationOption, SetOption, SlackOption, SystemArgument, question
 from quasilpv.conditions.blocks import Slack
 from quasilpv.conditions.condition import Options
 from quasilpv.studies import count
@@ -24,6 +24,7 @@ def complexity_command(
     representation: RepresentationOption = "",
     slack: SlackOption = Slack.THESIS,
     parameters: SetOption = None,
+    common: CommonOption = False,
     json: JsonOption = False,
 ) -> None:
     """Count unknowns, inequalities and rows of conditions as published, from the problems as built.
@@ -35,7 +36,9 @@ def complexity_command(
     Example:
       design complexity ex-I.1 --condition II.5 --condition II.6
     """
-    asked = [question(system, name, representation, parameters, Options(slack=slack)) for name in conditions]
+    asked = [
+        question(system, name, representation, parameters, Options(slack=slack, common=common)) for name in conditions
+    ]
     found = [(one.condition, one.representation, count(one).to_document()) for one in asked]
     if json:
         print_json([{"condition": name, "representation": shape, **sizes} for name, shape, sizes in found])

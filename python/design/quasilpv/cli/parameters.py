@@ -37,6 +37,18 @@ FormOption: TypeAlias = Annotated[
 ]
 
 
+CommonOption: TypeAlias = Annotated[
+    bool, typer.Option("--common", help="Multipliers without index: fewer unknowns, more conservative.")
+]
+WindowOption: TypeAlias = Annotated[
+    float | None,
+    typer.Option("--window-s", help="Window tau of laws with memory (II.7, II.8), s.  [default: the limit tau -> 0]"),
+]
+SampleOption: TypeAlias = Annotated[
+    float, typer.Option("--sample-period-s", help="Sample period of conditions on a sampled model, s.")
+]
+
+
 def question(
     system: str,
     condition: str,

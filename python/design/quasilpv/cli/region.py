@@ -12,13 +12,16 @@ import typer
 from quasilpv.artifact.files import write_atomically
 from quasilpv.cli.console import JsonOption, print_json, print_note, progress
 from quasilpv.cli.parameters import (
+    CommonOption,
     ConditionOption,
     DecayOption,
     FormOption,
     RepresentationOption,
+    SampleOption,
     SetOption,
     SlackOption,
     SystemArgument,
+    WindowOption,
     axis,
     question,
 )
@@ -43,6 +46,9 @@ def region_command(
     parameters: SetOption = None,
     decay: DecayOption = 0.0,
     form: FormOption = Form.REDUCED,
+    common: CommonOption = False,
+    window_s: WindowOption = None,
+    sample_period_s: SampleOption = Options.sample_period_s,
     grid: Annotated[
         bool, typer.Option("--grid/--adaptive", help="Solve every point, or refine a coarse grid along the boundary.")
     ] = False,
@@ -61,7 +67,7 @@ def region_command(
     Example:
       design region ex-I.1 --condition II.6 --x a=-8:8:17 --y b=-20:20:41
     """
-    options = Options(slack=slack, decay_rate=decay, form=form)
+    options = Options(slack, decay, form, window_s=window_s, common=common, sample_period_s=sample_period_s)
     asked = question(system, condition, representation, parameters, options)
     across, up = axis(x, "--x"), axis(y, "--y")
     if processes < 0:

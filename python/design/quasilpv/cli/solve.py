@@ -6,13 +6,16 @@ import math
 
 from quasilpv.cli.console import JsonOption, print_json
 from quasilpv.cli.parameters import (
+    CommonOption,
     ConditionOption,
     DecayOption,
     FormOption,
     RepresentationOption,
+    SampleOption,
     SetOption,
     SlackOption,
     SystemArgument,
+    WindowOption,
     question,
 )
 from quasilpv.conditions.blocks import Slack
@@ -30,6 +33,9 @@ def solve_command(
     parameters: SetOption = None,
     decay: DecayOption = 0.0,
     form: FormOption = Form.REDUCED,
+    common: CommonOption = False,
+    window_s: WindowOption = None,
+    sample_period_s: SampleOption = Options.sample_period_s,
     json: JsonOption = False,
 ) -> int:
     """Decide whether a condition holds for a system: feasible with a proof, infeasible numerically, or unknown.
@@ -41,7 +47,7 @@ def solve_command(
       design solve ex-I.1 --condition II.6 --set a=1 --set b=2.5
       design solve ex-I.1 --condition II.6 --set b=3 --slack full --json
     """
-    options = Options(slack=slack, decay_rate=decay, form=form)
+    options = Options(slack, decay, form, window_s=window_s, common=common, sample_period_s=sample_period_s)
     asked = question(system, condition, representation, parameters, options)
     answer = Sweep(asked, ()).at({})
     found = margin(asked, answer)

@@ -10,11 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.conditions.slack import Slack, slack_family
+from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable, block, zeros
 from quasilpv.lmi.exact import Matrix
 from quasilpv.lmi.expressions import Operand, as_expression
 
 __all__ = ["Slack", "block_diagonal", "double_sum", "identity_blocks", "pole_disk", "single_sum"]
+
+MAX_INEQUALITIES = 20_000
+"""Of one multiple sum."""
 
 
 def pole_disk(lyapunov: Operand, product: Operand, centre: Fraction, radius: Fraction) -> Expression:
@@ -71,6 +75,21 @@ def single_sum(
     return slack.variables
 
 
+def require_affordable(count: int, sums: int) -> None:
+    """Refuse a multiple sum that would take longer to write down than anybody waits.
+
+    Args:
+        count: number of vertices.
+        sums: how many sums over them.
+
+    Raises:
+        InputError: there would be more than `MAX_INEQUALITIES`.
+    """
+    if count**sums > MAX_INEQUALITIES:
+        expected = f"at most {MAX_INEQUALITIES}: a representation of fewer vertices"
+        raise InputError("condition", "inequalities", f"{count**sums} on {count} vertices", expected)
+
+
 def double_sum(
     problem: Problem,
     name: str,
@@ -98,7 +117,11 @@ def double_sum(
 
     Returns:
         The slack matrices.
+
+    Raises:
+        InputError: there would be more than `MAX_INEQUALITIES`.
     """
+    require_affordable(count, 2 + others)
     size = entry(*(0,) * (2 + others)).shape[0]
     shift = slack_family(slack, name, slack_blocks, size, sums=2 + others)
     own = Fraction(2, max(count - 1, 1))

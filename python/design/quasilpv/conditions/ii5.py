@@ -27,7 +27,7 @@ from dataclasses import replace
 import numpy as np
 
 from quasilpv.conditions import i2
-from quasilpv.conditions.blocks import double_sum, single_sum
+from quasilpv.conditions.blocks import double_sum, require_affordable, single_sum
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
@@ -86,6 +86,8 @@ def with_multipliers(
     single = options.common and is_single_sum(model, options.slack)
     if options.form is Form.REDUCED and single and is_cube(model, options.slack) and gains_are_free(model):
         return _as_cube(model, options, problem, V, P(0, 0))
+    if not single:
+        require_affordable(count, 2)
     labels = [""] * count if options.common else [str(j) for j in range(count)]
     unknowns = {label: (Variable(f"L{label}", q + n), Variable(f"R{label}", q + n)) for label in labels}
     LR = [unknowns[label] for label in labels]
