@@ -47,6 +47,12 @@ def test_a_parameter_that_moves_the_box_rebuilds_the_problem() -> None:
     assert not Sweep(Question("arm2", "II.6"), ("theta_max",)).updates
 
 
+def test_a_parameter_that_starts_at_its_lower_bound_can_be_swept() -> None:
+    sweep = Sweep(Question("arm3", "I.53", "reduced"), ("m3", "fv"))
+    assert sweep.updates
+    assert sweep.at({"m3": 4.2, "fv": 0.0}).verdict is Verdict.FEASIBLE
+
+
 def test_feasible_means_certified_and_nothing_else_does(full_map: Region) -> None:
     assert {p.answer.certified for p in full_map.points if p.answer.verdict is Verdict.FEASIBLE} == {True}
     assert {p.answer.certified for p in full_map.points if p.answer.verdict is not Verdict.FEASIBLE} == {False}

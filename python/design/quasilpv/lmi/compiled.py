@@ -278,8 +278,11 @@ def rounded(point: FloatArray) -> FloatArray:
 
 
 def _test_points(base: Mapping[str, float]) -> list[dict[str, float]]:
-    """Two points off the axes through the base point; the values are exact in double."""
-    first = {name: base[name] - 1.75 * (k + 1) for k, name in enumerate(base)}
+    """Two points off the axes through the base point, above it: masses and frictions are bounded below only.
+
+    The values are exact in double.
+    """
+    first = {name: base[name] + 1.75 * (k + 1) for k, name in enumerate(base)}
     second = {name: base[name] + 3.25 + 0.5 * k for k, name in enumerate(base)}
     return [first, second]
 
