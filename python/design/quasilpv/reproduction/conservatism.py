@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from math import pi, sqrt
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from quasilpv.conditions.condition import Options
@@ -55,10 +54,10 @@ class Dial:
     partitions: Sequence[str]
     single_sum: bool = False
 
-    def asked(self, effort: Effort) -> dict[tuple[str, Slack], Question]:
+    def asked(self) -> dict[tuple[str, Slack], Question]:
         """All combinations of representation and slack that are different problems."""
         families = [Slack.NONE, Slack.THESIS]
-        if effort is Effort.FULL and not self.single_sum:
+        if not self.single_sum:
             families.append(Slack.FULL)
         system, condition, parameters = self.question
         return {
@@ -132,7 +131,7 @@ def guarantee(dial: Dial) -> float:
 
 
 def _measured(dial: Dial, effort: Effort) -> list[dict[str, Any]]:
-    asked = dial.asked(effort)
+    asked = dial.asked()
     found = limits({str(key): (question, dial.over) for key, question in asked.items()}, TOLERANCE[effort])
     rows = []
     for (representation, slack), question in asked.items():
@@ -162,27 +161,28 @@ def _summary(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _figure(results: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figure:
     with style():
-        figure = new_figure(5.6, "Conservatism against complexity: partitions of the premises, slack matrices")
+        figure = new_figure(6.4, "Conservatism against complexity: partitions of the premises, slack matrices")
         panels = figure.subplots(2, 2).ravel()
         for panel, dial in zip(panels, DIALS, strict=True):
+            place = {name: k for k, name in enumerate(dial.partitions)}
             for slack, (marker, colour) in LOOKS.items():
                 own = [row for row in results[dial.title] if row["slack"] is slack and row["limit"] is not None]
-                places = np.array([(row["rows"], row["limit"]) for row in own]).reshape(-1, 2)
-                panel.plot(
-                    *places.T, linestyle="none", marker=marker, color=colour, fillstyle="none", label=slack.value
-                )
-                for row in own:
-                    name = row["representation"].removeprefix("grouped=")
-                    panel.annotate(name, (row["rows"], row["limit"]), (4, 3), textcoords="offset points", fontsize=6)
-            panel.set_xscale("log")
+                if own:
+                    at = [place[row["representation"]] for row in own], [row["limit"] for row in own]
+                    panel.plot(*at, linestyle="none", marker=marker, color=colour, fillstyle="none", label=slack.value)
+            vertices = {row["representation"]: (row["vertices"], row["rows"]) for row in results[dial.title]}
+            ticks = [f"{_short(name)}\n{vertices[name][0]} vert., {vertices[name][1]} rows" for name in dial.partitions]
+            panel.set_xticks(range(len(ticks)), ticks, fontsize=6.5, rotation=40, ha="right", rotation_mode="anchor")
             panel.set_title(dial.title)
-            panel.set_xlabel("rows of the inequalities (count)")
             panel.set_ylabel(dial.label)
-            panel.margins(x=0.15, y=0.12)
-        handles, labels = panels[0].get_legend_handles_labels()
-        named = [f"slack: {label}" for label in labels]
-        figure.legend(handles, named, loc="outside lower center", ncols=3)
+            panel.margins(x=0.08, y=0.1)
+        handles, labels = panels[1].get_legend_handles_labels()
+        figure.legend(handles, [f"slack: {label}" for label in labels], loc="outside lower center", ncols=3)
     return figure
+
+
+def _short(representation: str) -> str:
+    return representation.removeprefix("grouped=").replace("per-premise", "one each").replace("ts", "all (TS)")
 
 
 ITEMS = (

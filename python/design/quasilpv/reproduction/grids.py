@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from quasilpv.figures.region import region_figure
 from quasilpv.reproduction.item import Effort
-from quasilpv.reproduction.rules import feasible
+from quasilpv.reproduction.rules import feasible, undecided
 from quasilpv.studies.boundary import Boundary, Interval, find_boundary
 from quasilpv.studies.engines import in_processes
 from quasilpv.studies.question import Question
@@ -68,10 +68,11 @@ def nested_figure(regions: Mapping[str, Region], title: str, axis_labels: tuple[
 
 
 def sizes(regions: Mapping[str, Region]) -> dict[str, dict[str, float]]:
-    """Number of feasible and of all points, and seconds per point, of every map."""
+    """Number of feasible, undecided and all points, and seconds per point, of every map."""
     return {
         name: {
             "feasible": len(feasible(region)),
+            "undecided": undecided([region]),
             "points": len(region.points),
             "seconds_per_point": region.seconds / len(region.points),
         }
