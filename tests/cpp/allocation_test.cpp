@@ -67,6 +67,7 @@ namespace {
 
 using ::quasilpv::testing::artifact_table;
 using ::quasilpv::testing::json_twin;
+using ::quasilpv::testing::kLawKinds;
 
 // Allocations made by `action`.
 template <class Action>
@@ -101,7 +102,7 @@ TEST_F(Allocation, is_counted_for_new_for_aligned_new_and_for_dynamic_eigen) {
 }
 
 TEST_F(Allocation, does_not_happen_in_10000_steps_of_any_law_whatever_the_input) {
-  for (const char* kind : {"dob-acceleration", "dob-torque", "hinf-tracking", "pid", "ctc", "ctc-dob"}) {
+  for (const char* kind : kLawKinds) {
     for (const int joints : {1, 3, 7}) {
       Controller controller(Artifact::parse(json_twin(artifact_table(kind, joints)), "test"));
       std::uint32_t flags = 0;

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "quasilpv/document.hpp"
 #include "quasilpv/step.hpp"
@@ -18,6 +20,8 @@ struct TestArm {
   static constexpr double kLower = -0.5;
   static constexpr double kUpper = 1.0;
   static constexpr double kCentre = 0.2;
+  static constexpr double kFastest = 1.5;  ///< bound of the premise of the speed
+  static constexpr int kScheduleVertices = 4;
 
   Eigen::MatrixXd constant_inertia() const {
     Eigen::MatrixXd inertia = Eigen::MatrixXd::Constant(joints, joints, 0.1);
@@ -145,6 +149,66 @@ struct TestArm {
     return matrix;
   }
 
+  /// The schedule of the stabilising laws: cos(y_0), as in the inertia, and a premise of the speed, w_0 sin(y_0).
+  Eigen::VectorXd schedule(const Eigen::VectorXd& angle, const Eigen::VectorXd& speed) const {
+    return Eigen::Vector2d(std::clamp(std::cos(angle(0)), kLower, kUpper),
+                           std::clamp(speed(0) * std::sin(angle(0)), -kFastest, kFastest));
+  }
+
+  Json schedule_program() const {
+    return {{"outputs", 2}, {"code", Json::parse(R"([["angle",0],["cos"],["speed",0],["angle",0],["sin"],["mul"]])")}};
+  }
+
+  /// Vertices of the schedule as boxes: cos(y_0) at its bounds, then w_0 sin(y_0) at its bounds.
+  Json schedule_table(const std::vector<Eigen::MatrixXd>& vertices) const {
+    const auto pair = [&](std::size_t first) {
+      return Json::array({rows(vertices[first]), rows(vertices[first + 1])});
+    };
+    return {{"premises", 2},
+            {"lower", {kLower, -kFastest}},
+            {"upper", {kUpper, kFastest}},
+            {"centre", {kCentre, 0.0}},
+            {"blocks",
+             {{{"kind", "box"}, {"premises", {0}}, {"vertices", pair(0)}},
+              {{"kind", "box"}, {"premises", {1}}, {"vertices", pair(2)}}}}};
+  }
+
+  /// Weights of these vertices.
+  std::vector<double> schedule_weights(const Eigen::VectorXd& angle, const Eigen::VectorXd& speed) const {
+    const Eigen::VectorXd z = schedule(angle, speed);
+    const double first = (z(0) - kLower) / (kUpper - kLower);
+    const double second = (z(1) + kFastest) / (2.0 * kFastest);
+    return {0.5 * (1.0 - first), 0.5 * first, 0.5 * (1.0 - second), 0.5 * second};
+  }
+
+  /// Gain [Kp Kd] number i of the stabilising laws: no two are alike.
+  Eigen::MatrixXd state_gain(int i) const {
+    Eigen::MatrixXd gain(joints, 2 * joints);
+    const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(joints, joints);
+    gain << -(3000.0 + 40.0 * i) * one, -(200.0 + 3.0 * i) * one;
+    gain.array() += 1.7 * std::sin(static_cast<double>(i));
+    return gain;
+  }
+
+  /// P number i of the stabilising laws: positive definite, no two alike.
+  Eigen::MatrixXd state_lyapunov(int i) const {
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(2 * joints, 2 * joints);
+    for (int j = 0; j < joints; ++j) {
+      matrix(j, j) = 0.5 + 0.1 * i;
+      matrix(joints + j, joints + j) = 8.0 - 0.5 * i;
+      matrix(j, joints + j) = matrix(joints + j, j) = -0.3;
+    }
+    return matrix;
+  }
+
+  std::vector<Eigen::MatrixXd> numbered(int count, Eigen::MatrixXd (TestArm::*matrix)(int) const) const {
+    std::vector<Eigen::MatrixXd> result;
+    for (int i = 0; i < count; ++i) {
+      result.push_back((this->*matrix)(i));
+    }
+    return result;
+  }
+
   Json inertia_table() const {
     return table_of([this](const Eigen::VectorXd& premise) { return inertia_of_premises(premise); });
   }
@@ -173,6 +237,11 @@ struct TestArm {
 
 inline constexpr double kSamplePeriod = 1e-3;
 
+/// Every law kind.
+inline constexpr const char* kLawKinds[] = {
+    "dob-acceleration", "dob-torque", "hinf-tracking", "state-feedback", "descriptor-feedback",
+    "delayed-feedback", "pid",        "ctc",           "ctc-dob"};
+
 /// Member `law` of kind `kind`, with gains that make sense at 1 kHz.
 inline Json law_table(const std::string& kind, const TestArm& arm) {
   const auto repeated = [&arm](double value) { return Json(std::vector<double>(arm.joints, value)); };
@@ -190,6 +259,23 @@ inline Json law_table(const std::string& kind, const TestArm& arm) {
     law.update({{"numerator", arm.table_of([&arm](const Eigen::VectorXd& z) { return arm.numerator(z); })},
                 {"lyapunov", arm.rows(arm.lyapunov())},
                 {"velocity_filter_time_constant_s", 2e-3}});
+  } else if (kind == "state-feedback") {
+    law.update({{"gain", arm.schedule_table(arm.numbered(TestArm::kScheduleVertices, &TestArm::state_gain))},
+                {"velocity_filter_time_constant_s", 2e-3}});
+  } else if (kind == "descriptor-feedback") {
+    law.update({{"numerator", arm.schedule_table(arm.numbered(TestArm::kScheduleVertices, &TestArm::state_gain))},
+                {"lyapunov", arm.rows(arm.state_lyapunov(0))},
+                {"velocity_filter_time_constant_s", 2e-3}});
+  } else if (kind == "delayed-feedback") {
+    Json numerators = Json::array();
+    for (const Eigen::MatrixXd& numerator : arm.numbered(64, &TestArm::state_gain)) {
+      numerators.push_back(arm.rows(numerator));
+    }
+    law.update({{"lyapunov", arm.schedule_table(arm.numbered(TestArm::kScheduleVertices, &TestArm::state_lyapunov))},
+                {"numerators", numerators},
+                {"window_samples", 7},
+                {"descriptor", true},
+                {"velocity_filter_time_constant_s", 2e-3}});
   } else if (kind == "pid") {
     law.update({{"kp", repeated(4000.0)},
                 {"kd", repeated(300.0)},
@@ -205,6 +291,11 @@ inline Json law_table(const std::string& kind, const TestArm& arm) {
   return law;
 }
 
+/// The law kinds that stabilise: feedback of the state only, scheduled by a program of its own.
+inline bool has_schedule(const std::string& kind) {
+  return kind == "state-feedback" || kind == "descriptor-feedback" || kind == "delayed-feedback";
+}
+
 /// A complete artifact without its hash.
 inline Json artifact_table(const std::string& kind, int joints) {
   const TestArm arm{joints};
@@ -213,6 +304,8 @@ inline Json artifact_table(const std::string& kind, int joints) {
     programs["coriolis_reference"] = arm.coriolis_program("reference_speed");
   } else if (kind == "ctc" || kind == "ctc-dob") {
     programs["coriolis"] = arm.coriolis_program("speed");
+  } else if (has_schedule(kind)) {
+    programs["schedule"] = arm.schedule_program();
   }
   const Json interval = Json(std::vector<Json>(joints, Json::array({-2.0, 2.0})));
   return {{"schema", "quasilpv.artifact"},

@@ -16,6 +16,7 @@ namespace {
 using ::quasilpv::testing::artifact_table;
 using ::quasilpv::testing::cbor_twin;
 using ::quasilpv::testing::json_twin;
+using ::quasilpv::testing::kLawKinds;
 using ::quasilpv::testing::refusal;
 using ::quasilpv::testing::with_hash;
 using ::testing::HasSubstr;
@@ -67,7 +68,7 @@ TEST(Artifact, is_the_same_from_either_twin_and_from_a_file) {
 }
 
 TEST(Artifact, loads_every_kind_for_every_number_of_joints) {
-  for (const char* kind : {"dob-acceleration", "dob-torque", "hinf-tracking", "pid", "ctc", "ctc-dob"}) {
+  for (const char* kind : kLawKinds) {
     for (int joints = 1; joints <= kMaxJoints; ++joints) {
       const Artifact artifact = parse(artifact_table(kind, joints));
       EXPECT_EQ(artifact.law_kind(), kind);
@@ -155,6 +156,41 @@ TEST(Artifact, refuses_a_lyapunov_matrix_of_another_shape_or_that_is_not_symmetr
               HasSubstr("a.json: law.lyapunov: got smallest eigenvalue -"));
   EXPECT_THAT(refused("/law/numerator/lower/0", -0.6, "hinf-tracking"),
               HasSubstr("a.json: law.numerator: got another box, centre or partition of the premises"));
+}
+
+TEST(Artifact, refuses_a_schedule_of_another_size_than_the_gains_or_that_reads_the_reference) {
+  for (const char* kind : {"state-feedback", "descriptor-feedback", "delayed-feedback"}) {
+    EXPECT_THAT(refused("/programs/schedule/outputs", 1, kind), HasSubstr("programs.schedule.outputs: got 1")) << kind;
+    EXPECT_THAT(refused("/programs/schedule/code/2/0", "reference_speed", kind),
+                HasSubstr("a.json: programs.schedule.code[2]: "));
+    EXPECT_THAT(refused("/programs/premises/code/0/0", "speed", kind), HasSubstr("programs.premises.code[0]: "));
+  }
+  EXPECT_THAT(refused("/law/gain/blocks/0/vertices/0/0", {1.0, 2.0, 3.0}, "state-feedback"),
+              HasSubstr("a.json: law.gain.blocks[0].vertices[0][0]: got an array of 3"));
+  EXPECT_THAT(refused("/law/lyapunov/0/1", 9.0, "descriptor-feedback"),
+              HasSubstr("a.json: law.lyapunov: got a matrix with asymmetry"));
+}
+
+TEST(Artifact, refuses_a_window_that_is_too_short_to_have_a_mean_but_not_its_limit) {
+  for (const int samples : {1, 4, -1, 4097}) {
+    EXPECT_THAT(refused("/law/window_samples", samples, "delayed-feedback"),
+                HasSubstr("a.json: law.window_samples: got " + std::to_string(samples)));
+  }
+  for (const int samples : {0, 5, 4096}) {
+    EXPECT_EQ(refused("/law/window_samples", samples, "delayed-feedback"), "accepted");
+  }
+}
+
+TEST(Artifact, refuses_delayed_gains_that_are_not_one_per_triple_of_vertices_and_a_vertex_that_is_no_lyapunov_matrix) {
+  Json table = artifact_table("delayed-feedback", 2);
+  table["law"]["numerators"].erase(3);
+  EXPECT_THAT(refusal([&] { parse(table); }),
+              HasSubstr("a.json: law.numerators: got 63 matrices, expected 64, the cube of the number of vertices"));
+  EXPECT_THAT(refused("/law/lyapunov/blocks/1/vertices/0/0/0", -1.0, "delayed-feedback"),
+              HasSubstr("a.json: law.lyapunov.blocks: got smallest eigenvalue -"));
+  EXPECT_THAT(refused("/law/lyapunov/blocks/1/vertices/0/0/1", 0.1, "delayed-feedback"),
+              HasSubstr("a.json: law.lyapunov.blocks: got vertex 2 with asymmetry"));
+  EXPECT_THAT(refused("/law/descriptor", 1, "delayed-feedback"), HasSubstr("a.json: law.descriptor: got 1"));
 }
 
 TEST(Artifact, refuses_an_inertia_that_is_not_symmetric) {

@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "artifact_fixture.hpp"
 #include "quasilpv/step.hpp"
@@ -181,6 +182,93 @@ struct WrittenOutHinfTracking : WrittenOutVelocityLaw {
         integral(j) -= kSamplePeriod * e(j);
       }
     }
+    return commanded;
+  }
+};
+
+/// x = (y - r, w - r') of the laws that stabilise, and the sum of vertices with the weights of their schedule.
+struct WrittenOutStabilisingLaw : WrittenOutVelocityLaw {
+  using WrittenOutVelocityLaw::WrittenOutVelocityLaw;
+
+  Eigen::VectorXd state(const Sample& s) const {
+    Eigen::VectorXd x(2 * arm.joints);
+    x << s.angle - s.reference, w - s.reference_speed;
+    return x;
+  }
+
+  template <class Matrix>
+  static Eigen::MatrixXd weighted(const std::vector<double>& weights, const Matrix& matrix) {
+    Eigen::MatrixXd sum = weights[0] * matrix(0);
+    for (std::size_t i = 1; i < weights.size(); ++i) {
+      sum += weights[i] * matrix(static_cast<int>(i));
+    }
+    return sum;
+  }
+
+  Eigen::MatrixXd descriptor(const Eigen::VectorXd& angle) const {
+    Eigen::MatrixXd E = Eigen::MatrixXd::Identity(2 * arm.joints, 2 * arm.joints);
+    E.bottomRightCorner(arm.joints, arm.joints) = arm.inertia(angle);
+    return E;
+  }
+};
+
+struct WrittenOutStateFeedback : WrittenOutStabilisingLaw {
+  using WrittenOutStabilisingLaw::WrittenOutStabilisingLaw;
+
+  Eigen::VectorXd step(const Sample& s) override {
+    filter(s.speed);
+    const auto gain = [this](int i) { return arm.state_gain(i); };
+    const Eigen::VectorXd commanded = weighted(arm.schedule_weights(s.angle, w), gain) * state(s);
+    output.apply(commanded);
+    return commanded;
+  }
+};
+
+struct WrittenOutDescriptorFeedback : WrittenOutStabilisingLaw {
+  using WrittenOutStabilisingLaw::WrittenOutStabilisingLaw;
+
+  Eigen::VectorXd step(const Sample& s) override {
+    filter(s.speed);
+    const auto gain = [this](int i) { return arm.state_gain(i); };
+    const Eigen::MatrixXd F = weighted(arm.schedule_weights(s.angle, w), gain);
+    const Eigen::VectorXd commanded =
+        F * descriptor(s.angle).transpose().inverse() * arm.state_lyapunov(0).inverse() * state(s);
+    output.apply(commanded);
+    return commanded;
+  }
+};
+
+/// The whole past is kept, and the mean taken over it by the trapezoidal rule at every sample.
+struct WrittenOutDelayedFeedback : WrittenOutStabilisingLaw {
+  using WrittenOutStabilisingLaw::WrittenOutStabilisingLaw;
+  static constexpr std::size_t kWindow = 7;
+  std::vector<std::vector<double>> past;
+
+  std::vector<double> at(std::size_t age) const { return past.size() > age ? past[past.size() - 1 - age] : past[0]; }
+
+  std::vector<double> mean() const {
+    std::vector<double> sum(TestArm::kScheduleVertices, 0.0);
+    for (std::size_t age = 0; age <= kWindow; ++age) {
+      for (std::size_t i = 0; i < sum.size(); ++i) {
+        sum[i] += (age == 0 || age == kWindow ? 0.5 : 1.0) * at(age)[i] / static_cast<double>(kWindow);
+      }
+    }
+    return sum;
+  }
+
+  Eigen::VectorXd step(const Sample& s) override {
+    filter(s.speed);
+    past.push_back(arm.schedule_weights(s.angle, w));
+    const std::vector<double> varpi = mean();
+    const auto numerator = [&](int j) {
+      return weighted(varpi, [&](int k) {
+        return weighted(at(kWindow), [&](int m) { return arm.state_gain((4 * j + k) * 4 + m); });
+      });
+    };
+    const Eigen::MatrixXd P = weighted(varpi, [this](int k) { return arm.state_lyapunov(k); });
+    const Eigen::VectorXd commanded =
+        weighted(at(0), numerator) * descriptor(s.angle).transpose().inverse() * P.inverse() * state(s);
+    output.apply(commanded);
     return commanded;
   }
 };

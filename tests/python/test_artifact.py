@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from quasilpv.artifact import Artifact, compile_program, diff, evaluate, read_artifact, summary, write_artifact
 from quasilpv.artifact.canonical import canonical_cbor, canonical_json, parse_document, with_hash
-from quasilpv.artifact.schema import REQUIRED_PROGRAMS, PolytopeTable
+from quasilpv.artifact.schema import REQUIRED_PROGRAMS
+from quasilpv.artifact.tables import PolytopeTable
 from quasilpv.errors import InputError
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.systems.registry import robot
@@ -44,6 +45,31 @@ LAWS: dict[str, dict[str, Any]] = {
 }
 
 
+SCHEDULE_GAINS = np.array([np.hstack([-(i + 3.0) * np.eye(3), -np.eye(3)]) for i in range(64)])
+SCHEDULE_LYAPUNOV = np.array([np.diag([2.0 + i, 2.0, 2.0, 5.0, 5.0, 5.0]) for i in range(4)])
+
+
+def schedule_table(vertices: Any) -> dict[str, Any]:
+    """A table over the premises of ``schedule``."""
+    return BlockPolytope.per_premise([-1.0, -2.0], [1.0, 2.0]).to_document(vertices)
+
+
+STABILISING = {
+    "state-feedback": {"gain": schedule_table(SCHEDULE_GAINS[:4])},
+    "descriptor-feedback": {
+        "numerator": schedule_table(SCHEDULE_GAINS[:4]),
+        "lyapunov": SCHEDULE_LYAPUNOV[0].tolist(),
+    },
+    "delayed-feedback": {
+        "lyapunov": schedule_table(SCHEDULE_LYAPUNOV),
+        "numerators": SCHEDULE_GAINS.tolist(),
+        "window_samples": 20,
+        "descriptor": True,
+    },
+}
+LAWS |= {kind: {**law, "velocity_filter_time_constant_s": 2e-3} for kind, law in STABILISING.items()}
+
+
 def arm3_programs() -> dict[str, Any]:
     """The programs of the 3-DoF arm, compiled from its symbolic model."""
     arm3 = robot("arm3")
@@ -56,6 +82,9 @@ def arm3_programs() -> dict[str, Any]:
         "premises": compile_program([premise.expression for premise in symbolic.inertia_premises(arm3.domain)], angles),
         "gravity": compile_program(list(symbolic.gravity), angles),
         "coriolis": compile_program(list(symbolic.coriolis * sp.Matrix(symbolic.omega)), {**angles, **speeds}),
+        "schedule": compile_program(
+            [sp.cos(symbolic.theta[1]), symbolic.omega[0] * sp.sin(symbolic.theta[1])], {**angles, **speeds}
+        ),
         "coriolis_reference": compile_program(
             list(symbolic.coriolis * sp.Matrix(rates)), {**angles, **speeds, **reference_speeds}
         ),
@@ -219,7 +248,7 @@ VERTICES = ("law", "inertia", "blocks", 0, "vertices")
         (
             at("law", "kind", value="lqr"),
             "law",
-            "got 'lqr', expected one of 'dob-acceleration', 'dob-torque', 'hinf-tracking', 'pid', 'ctc', 'ctc-dob'",
+            f"got 'lqr', expected one of {', '.join(repr(kind) for kind in REQUIRED_PROGRAMS)}",
         ),
         (without("law", "kind"), "law", "got nothing, expected a member 'kind'"),
         (without("law", "observer"), "law.observer", "got nothing"),
@@ -287,6 +316,42 @@ def test_when_a_gain_table_does_not_fit_the_inertia_expect_it_named(
     with pytest.raises(InputError) as error:
         Artifact.from_document(document, "artifact.json")
     assert (error.value.field, message in str(error.value)) == (field, True)
+
+
+DELAYED = ("law", "lyapunov", "blocks", 1, "vertices", 0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "field", "message"),
+    [
+        ("state-feedback", at("law", "gain", value=schedule_table(SCHEDULE_GAINS[:4, :2])), "law.gain", "got 2 x 6"),
+        ("state-feedback", at("programs", "schedule", "outputs", value=1), "programs.schedule.outputs", "expected 2"),
+        (
+            "state-feedback",
+            at("programs", "schedule", "code", 0, value=["angle", 3]),
+            "programs.schedule.code",
+            "below 3",
+        ),
+        ("descriptor-feedback", at("law", "lyapunov", 0, 1, value=9.0), "law.lyapunov[0][1]", "the symmetric entry"),
+        ("descriptor-feedback", at("law", "lyapunov", 0, 0, value=-1.0), "law.lyapunov", "a positive definite matrix"),
+        ("descriptor-feedback", without("law", "lyapunov", 5), "law.lyapunov", "got 5 x 6, expected 6 x 6"),
+        ("delayed-feedback", without("law", "numerators", 7), "law.numerators", "got 63 matrices, expected 64"),
+        ("delayed-feedback", at("law", "numerators", 9, value=[[1.0]]), "law.numerators[9]", "got 1 x 1"),
+        ("delayed-feedback", at(*DELAYED, 0, 0, value=-1.0), "law.lyapunov.blocks[1].vertices[0]", "positive definite"),
+        ("delayed-feedback", at("law", "window_samples", value=4), "law.window_samples", "or at least 5"),
+        ("delayed-feedback", at("law", "window_samples", value=4097), "law.window_samples", "less than or equal to"),
+        ("delayed-feedback", at("law", "descriptor", value=1), "law.descriptor", "a valid boolean"),
+    ],
+)
+def test_when_a_scheduled_law_breaks_a_rule_expect_it_named(
+    kind: str, change: Callable[[dict], None], field: str, message: str
+) -> None:
+    document = arm3_document(kind)
+    change(document)
+    with pytest.raises(InputError) as error:
+        Artifact.from_document(document, "artifact.json")
+    assert error.value.field.startswith(field)
+    assert message in str(error.value)
 
 
 def test_when_gain_tables_are_exchanged_expect_the_size_of_a_vertex_named() -> None:

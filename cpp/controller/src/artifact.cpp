@@ -129,15 +129,92 @@ DobTorqueParameters parse_dob_torque(const Field& law, const Field& programs, in
   return {std::move(model), std::move(feedback), std::move(observer), law["filter_time_constant_s"].positive()};
 }
 
+Eigen::MatrixXd parse_lyapunov(const Field& field, int size) {
+  Eigen::MatrixXd lyapunov = parse_matrix(field, size, size);
+  require_symmetric(field, "a matrix", lyapunov, "a symmetric matrix");
+  require_positive_definite(field, "", lyapunov, "a positive definite matrix");
+  return lyapunov;
+}
+
 HinfTrackingParameters parse_hinf_tracking(const Field& law, const Field& programs, int joints) {
   programs.only({"premises", "gravity"});
   law.only({"kind", "numerator", "lyapunov", "velocity_filter_time_constant_s", "inertia"});
   DesignModel model = parse_model(law, programs, joints);
   BlockPolytope numerator = parse_gains(law["numerator"], model.inertia, joints, 3 * joints);
-  Eigen::MatrixXd lyapunov = parse_matrix(law["lyapunov"], 3 * joints, 3 * joints);
-  require_symmetric(law["lyapunov"], "a matrix", lyapunov, "a symmetric matrix");
-  require_positive_definite(law["lyapunov"], "", lyapunov, "a positive definite matrix");
-  return {std::move(model), std::move(numerator), std::move(lyapunov),
+  return {std::move(model), std::move(numerator), parse_lyapunov(law["lyapunov"], 3 * joints),
+          law["velocity_filter_time_constant_s"].non_negative()};
+}
+
+// Premises of gains: from angles and speeds, as many as the table has.
+Program parse_schedule(const Field& programs, int joints, const BlockPolytope& table) {
+  return Program::parse(programs["schedule"], {joints, true, false}, table.premises());
+}
+
+StateFeedbackParameters parse_state_feedback(const Field& law, const Field& programs, int joints) {
+  programs.only({"premises", "gravity", "schedule"});
+  law.only({"kind", "gain", "velocity_filter_time_constant_s", "inertia"});
+  DesignModel model = parse_model(law, programs, joints);
+  BlockPolytope gain = BlockPolytope::parse(law["gain"], joints, 2 * joints);
+  Program schedule = parse_schedule(programs, joints, gain);
+  return {std::move(model), std::move(schedule), std::move(gain),
+          law["velocity_filter_time_constant_s"].non_negative()};
+}
+
+DescriptorFeedbackParameters parse_descriptor_feedback(const Field& law, const Field& programs, int joints) {
+  programs.only({"premises", "gravity", "schedule"});
+  law.only({"kind", "numerator", "lyapunov", "velocity_filter_time_constant_s", "inertia"});
+  DesignModel model = parse_model(law, programs, joints);
+  BlockPolytope numerator = BlockPolytope::parse(law["numerator"], joints, 2 * joints);
+  Program schedule = parse_schedule(programs, joints, numerator);
+  return {std::move(model), std::move(schedule), std::move(numerator), parse_lyapunov(law["lyapunov"], 2 * joints),
+          law["velocity_filter_time_constant_s"].non_negative()};
+}
+
+// A window shorter than a few samples has no mean to speak of: it is 0, and the artifact says so, or long enough.
+int parse_window(const Field& field) {
+  const auto samples = static_cast<int>(field.integer(0, kMaxWindowSamples));
+  if (samples > 0 && samples < kMinWindowSamples) {
+    field.fail(std::to_string(samples),
+               "0 (the limit of a short window) or at least " + std::to_string(kMinWindowSamples) + " sample periods");
+  }
+  return samples;
+}
+
+std::vector<Eigen::MatrixXd> parse_numerators(const Field& field, int count, int joints) {
+  if (field.size() != static_cast<std::size_t>(count)) {
+    field.fail(std::to_string(field.size()) + " matrices",
+               std::to_string(count) + ", the cube of the number of vertices");
+  }
+  std::vector<Eigen::MatrixXd> numerators;
+  for (std::size_t i = 0; i < field.size(); ++i) {
+    numerators.push_back(parse_matrix(field.at(i), joints, 2 * joints));
+  }
+  return numerators;
+}
+
+DelayedFeedbackParameters parse_delayed_feedback(const Field& law, const Field& programs, int joints) {
+  programs.only({"premises", "gravity", "schedule"});
+  law.only(
+      {"kind", "lyapunov", "numerators", "window_samples", "descriptor", "velocity_filter_time_constant_s", "inertia"});
+  DesignModel model = parse_model(law, programs, joints);
+  BlockPolytope lyapunov = BlockPolytope::parse(law["lyapunov"], 2 * joints, 2 * joints);
+  const int count = lyapunov.vertices();
+  if (count > kMaxDelayedVertices) {
+    law["lyapunov"].fail(std::to_string(count) + " vertices", "at most " + std::to_string(kMaxDelayedVertices));
+  }
+  for (int k = 0; k < count; ++k) {
+    const std::string vertex = "vertex " + std::to_string(k);
+    require_symmetric(law["lyapunov"]["blocks"], vertex, lyapunov.vertex(k), "symmetric vertices");
+    require_positive_definite(law["lyapunov"]["blocks"], " of " + vertex, lyapunov.vertex(k),
+                              "positive definite vertices");
+  }
+  Program schedule = parse_schedule(programs, joints, lyapunov);
+  return {std::move(model),
+          std::move(schedule),
+          std::move(lyapunov),
+          parse_numerators(law["numerators"], count * count * count, joints),
+          parse_window(law["window_samples"]),
+          law["descriptor"].boolean(),
           law["velocity_filter_time_constant_s"].non_negative()};
 }
 
@@ -230,12 +307,20 @@ void Artifact::parse_law(const Field& law, const Field& programs) {
     law_ = parse_dob_torque(law, programs, joints_);
   } else if (law_kind_ == "hinf-tracking") {
     law_ = parse_hinf_tracking(law, programs, joints_);
+  } else if (law_kind_ == "state-feedback") {
+    law_ = parse_state_feedback(law, programs, joints_);
+  } else if (law_kind_ == "descriptor-feedback") {
+    law_ = parse_descriptor_feedback(law, programs, joints_);
+  } else if (law_kind_ == "delayed-feedback") {
+    law_ = parse_delayed_feedback(law, programs, joints_);
   } else if (law_kind_ == "pid") {
     law_ = parse_pid(law, programs, joints_);
   } else if (law_kind_ == "ctc" || law_kind_ == "ctc-dob") {
     law_ = parse_computed_torque(law, programs, joints_);
   } else {
-    law["kind"].fail(Json(law_kind_).dump(), "dob-acceleration, dob-torque, hinf-tracking, pid, ctc or ctc-dob");
+    law["kind"].fail(Json(law_kind_).dump(),
+                     "dob-acceleration, dob-torque, hinf-tracking, state-feedback, descriptor-feedback, "
+                     "delayed-feedback, pid, ctc or ctc-dob");
   }
 }
 

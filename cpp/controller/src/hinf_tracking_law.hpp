@@ -1,6 +1,7 @@
 // H-infinity PI tracking with a gain that is rational in the premises: the law of Theorem III.10.
 #pragma once
 
+#include "descriptor_gain.hpp"
 #include "velocity_law.hpp"
 
 namespace quasilpv {
@@ -16,41 +17,23 @@ class HinfTrackingLaw final : public VelocityLaw<N> {
  public:
   HinfTrackingLaw(const HinfTrackingParameters& parameters, const LawSettings& settings)
       : VelocityLaw<N>(parameters.model, settings, parameters.velocity_filter_time_constant_s),
-        numerator_(parameters.numerator) {
-    const State lyapunov = parameters.lyapunov;
-    for (int j = 0; j < 3 * N; ++j) {
-      inverse_lyapunov_.col(j) = solve_positive_definite<3 * N>(lyapunov, State::Identity().col(j));
-    }
-  }
+        numerator_(parameters.numerator),
+        gain_(parameters.lyapunov) {}
 
  private:
   using typename VelocityLaw<N>::Sample;
-  using State = Eigen::Matrix<double, 3 * N, 3 * N>;
 
   Command<N> control(const Sample& sample, const ModelSample<N>& model, StepReport& report) noexcept override {
-    const TrackingGain<N> gain = gain_at(model, report);
+    TrackingGain<N> numerator;
+    numerator_.evaluate(report.premise.data(), numerator);
+    const TrackingGain<N> gain = gain_.at(model, numerator, report);
     TrackingError<N> error;
     error << sample.angle - sample.reference.angle, sample.speed - sample.reference.speed, -sample.integral;
     return {gain * error, -gain.template rightCols<N>().diagonal()};
   }
 
-  // Row by row: the middle block of y E^-T is the solution x of M x = y.
-  TrackingGain<N> gain_at(const ModelSample<N>& model, StepReport& report) const noexcept {
-    TrackingGain<N> numerator;
-    numerator_.evaluate(report.premise.data(), numerator);
-    for (int j = 0; j < N; ++j) {
-      const JointVector<N> row = numerator.template block<1, N>(j, N).transpose();
-      numerator.template block<1, N>(j, N) = model.acceleration(row).transpose();
-    }
-    const TrackingGain<N> gain = numerator * inverse_lyapunov_;
-    if (!gain.allFinite()) {
-      report.flags |= kModelInvalid;
-    }
-    return gain;
-  }
-
   BlockPolytope numerator_;
-  State inverse_lyapunov_;
+  DescriptorGain<N, 3 * N> gain_;
 };
 
 }  // namespace quasilpv

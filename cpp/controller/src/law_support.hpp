@@ -135,9 +135,9 @@ struct Command {
   JointVector<N> integral_gain;
 };
 
-/// Forward Euler of the integral of the error, e_I += T e. Anti-windup by clamping: joint j is frozen while its torque
-/// is limited and gain_j e_j pushes further in the direction that the limits cut off, or while the torque is not
-/// finite.
+/// Forward Euler of the integral of the error, e_I += T e, of the joints that have integral action. Anti-windup by
+/// clamping: joint j is frozen while its torque is limited and gain_j e_j pushes further in the direction that the
+/// limits cut off, or while the torque is not finite.
 template <int N>
 void integrate_error(const JointVector<N>& error, const JointVector<N>& gain, const StepReport& report,
                      double sample_period_s, JointVector<N>& integral) noexcept {
@@ -145,7 +145,7 @@ void integrate_error(const JointVector<N>& error, const JointVector<N>& gain, co
     const auto joint = static_cast<std::size_t>(j);
     const double cut_off = report.torque_commanded[joint] - report.torque_applied[joint];
     const bool winds_up = !(cut_off * gain[j] * error[j] <= 0.0);  // true for NaN
-    if (!winds_up) {
+    if (!winds_up && gain[j] != 0.0) {
       integral[j] += sample_period_s * error[j];
     }
   }

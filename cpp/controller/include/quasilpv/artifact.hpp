@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "quasilpv/block_polytope.hpp"
 #include "quasilpv/limiter.hpp"
@@ -49,6 +50,39 @@ struct HinfTrackingParameters {
   double velocity_filter_time_constant_s = 0.0;  ///< 0: no filter
 };
 
+/// Kind `state-feedback`: u = K(z) x with x = (y - r, w - r').
+struct StateFeedbackParameters {
+  DesignModel model;
+  Program schedule;                              ///< premises of the gain, from angles and speeds
+  BlockPolytope gain;                            ///< K, n x 2n: N m/rad, N m s/rad
+  double velocity_filter_time_constant_s = 0.0;  ///< 0: no filter
+};
+
+/// Kind `descriptor-feedback`: u = F(z) E(z)^-T P^-1 x with E = diag(I, M_n) and x = (y - r, w - r').
+struct DescriptorFeedbackParameters {
+  DesignModel model;
+  Program schedule;                              ///< premises of F, from angles and speeds
+  BlockPolytope numerator;                       ///< F, n x 2n
+  Eigen::MatrixXd lyapunov;                      ///< P, 2n x 2n, symmetric positive definite
+  double velocity_filter_time_constant_s = 0.0;  ///< 0: no filter
+};
+
+inline constexpr int kMaxDelayedVertices = 16;
+inline constexpr int kMinWindowSamples = 5;
+inline constexpr int kMaxWindowSamples = 4096;
+
+/// Kind `delayed-feedback`: u = F E(z)^-T P(varpi)^-1 x, F = sum_jkm w_j(z) varpi_k w_m(z_d) F_jkm, with varpi the mean
+/// of the weights w over the last tau = N T seconds and z_d what z was tau ago; without E if `descriptor` is false.
+struct DelayedFeedbackParameters {
+  DesignModel model;
+  Program schedule;                         ///< premises of P and F, from angles and speeds
+  BlockPolytope lyapunov;                   ///< P, 2n x 2n, symmetric positive definite vertices; gives the weights
+  std::vector<Eigen::MatrixXd> numerators;  ///< F_jkm, n x 2n, m fastest
+  int window_samples = 0;                   ///< N; 0: the limit tau -> 0, varpi = w(z) and z_d = z
+  bool descriptor = false;                  ///< false: without E(z)
+  double velocity_filter_time_constant_s = 0.0;  ///< 0: no filter
+};
+
 /// Kind `pid`: gains in N m/rad, N m s/rad, N m/(rad s), acting on r - y.
 struct PidParameters {
   DesignModel model;
@@ -70,8 +104,9 @@ struct ComputedTorqueParameters {
   double disturbance_observer_bandwidth_rad_s = 0.0;  ///< 0: kind `ctc`
 };
 
-using LawParameters = std::variant<DobAccelerationParameters, DobTorqueParameters, HinfTrackingParameters,
-                                   PidParameters, ComputedTorqueParameters>;
+using LawParameters =
+    std::variant<DobAccelerationParameters, DobTorqueParameters, HinfTrackingParameters, StateFeedbackParameters,
+                 DescriptorFeedbackParameters, DelayedFeedbackParameters, PidParameters, ComputedTorqueParameters>;
 
 /// Interval of one joint.
 struct Interval {

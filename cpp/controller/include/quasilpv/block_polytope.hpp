@@ -23,13 +23,19 @@ class BlockPolytope {
   /// INIT-ONLY. Throws InputError for a malformed field and for a collapse that does not reproduce every vertex.
   static BlockPolytope parse(const Field& field, int rows, int columns);
 
-  /// Clamps z to the box in place (a premise that is not finite becomes the centre) and stores X(z).
+  /// Clamps z to the box in place, see clamp(), and stores X(z).
   /// RT-SAFE (bounded, no allocation, no lock, no throw).
   /// \param[in,out] premise `premises()` values.
   /// \param[out] value X(z); Rows x Columns must be the size given to parse().
   /// \returns whether a premise was outside its interval.
   template <int Rows, int Columns>
   bool evaluate(double* premise, Eigen::Matrix<double, Rows, Columns>& value) const noexcept;
+
+  /// Clamps z to the box in place; a premise that is not finite becomes the centre.
+  /// RT-SAFE (bounded, no allocation, no lock, no throw).
+  /// \param[in,out] premise `premises()` values.
+  /// \returns whether a premise was outside its interval.
+  bool clamp(double* premise) const noexcept;
 
   /// Weight of every vertex, block by block, for z inside the box. RT-SAFE (bounded, no allocation, no lock, no throw).
   /// \param[out] weight `vertices()` values, each >= 0.
@@ -57,8 +63,6 @@ class BlockPolytope {
   void collapse(const Field& field);
   Eigen::MatrixXd vertex_sum(const double* premise) const;
   double corner_weight(const Block& block, std::size_t corner, const double* premise) const noexcept;
-  bool clamp(double* premise) const noexcept;
-
   std::vector<double> lower_;
   std::vector<double> upper_;
   std::vector<double> centre_;

@@ -39,6 +39,12 @@ std::unique_ptr<ControlLaw> make_law(const DobAccelerationParameters& parameters
 std::unique_ptr<ControlLaw> make_law(const DobTorqueParameters& parameters, const LawSettings& settings);
 /// H-infinity PI tracking, Dehak 2022, Theorem III.10. INIT-ONLY.
 std::unique_ptr<ControlLaw> make_law(const HinfTrackingParameters& parameters, const LawSettings& settings);
+/// Scheduled state feedback, Dehak 2022, Theorem I.2; with a smaller schedule, (III.25). INIT-ONLY.
+std::unique_ptr<ControlLaw> make_law(const StateFeedbackParameters& parameters, const LawSettings& settings);
+/// Descriptor feedback, Dehak 2022, (II.38). INIT-ONLY.
+std::unique_ptr<ControlLaw> make_law(const DescriptorFeedbackParameters& parameters, const LawSettings& settings);
+/// Feedback with a moving window, Dehak 2022, (II.49) and (II.69). INIT-ONLY.
+std::unique_ptr<ControlLaw> make_law(const DelayedFeedbackParameters& parameters, const LawSettings& settings);
 /// PID with feedforward, Dehak 2022 (III.54). INIT-ONLY.
 std::unique_ptr<ControlLaw> make_law(const PidParameters& parameters, const LawSettings& settings);
 /// Computed torque with and without disturbance observer, Dehak 2022 (III.56). INIT-ONLY.
