@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
-from quasilpv.lmi import Outcome, Problem, Variable, block, he, is_positive_definite, to_rational
+from quasilpv.lmi import Outcome, Problem, Variable, block, he, is_positive_definite, largest_margin, to_rational
 from quasilpv.lmi.compiled import CompiledProblem, compile_family, rounded
 from quasilpv.lmi.feasibility import decide
 from quasilpv.lmi.independence import independent_columns
@@ -173,6 +173,18 @@ def test_lyapunov_inequality_is_decided_as_the_eigenvalues_say(seed: int) -> Non
         assert np.linalg.eigvalsh(P)[0] > 0 > np.linalg.eigvalsh(A @ P + P @ A.T)[-1]
     else:
         assert decision.excluded_norm > 1e3
+
+
+def test_the_margin_reached_is_that_of_the_point_and_no_larger_than_the_largest() -> None:
+    problem = lyapunov(np.array([[-1.0, 2.0, 0.0], [0.0, -3.0, 1.0], [0.5, 0.0, -2.0]]))
+    decision = decide(CompiledProblem.of(problem))
+    eigenvalues = [
+        np.linalg.eigvalsh((M + M.T) / 2)
+        for M in (c.expression.at(decision.values).astype(float) for c in problem.constraints)
+    ]
+    expected = min(e[0] for e in eigenvalues) / np.mean(np.concatenate(eigenvalues))
+    assert decision.margin == pytest.approx(expected, rel=1e-12)
+    assert 0.0 < decision.margin <= largest_margin(problem).margin * (1 + 1e-6)
 
 
 def test_inequalities_with_constants_are_refused() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from quasilpv.cli.console import JsonOption, print_json
 from quasilpv.cli.parameters import (
     CommonOption,
@@ -21,7 +19,7 @@ from quasilpv.cli.parameters import (
 from quasilpv.conditions.blocks import Slack
 from quasilpv.conditions.condition import Form, Options
 from quasilpv.studies import Answer, Sweep, Verdict
-from quasilpv.studies.question import margin
+from quasilpv.studies.question import largest_or_reached_margin
 
 
 def solve_command(
@@ -50,13 +48,13 @@ def solve_command(
     options = Options(slack, decay, form, window_s=window_s, common=common, sample_period_s=sample_period_s)
     asked = question(system, condition, representation, parameters, options)
     answer = Sweep(asked, ()).at({})
-    found = margin(asked, answer)
+    margin = largest_or_reached_margin(asked, answer)
     if json:
         print_json(
             {
                 "verdict": answer.verdict.value,
                 "certified": answer.certified,
-                "margin": found if math.isfinite(found) else None,
+                "margin": margin,
                 "unknowns": answer.unknowns,
                 "rows": answer.rows,
                 "seconds": answer.seconds,
@@ -64,7 +62,8 @@ def solve_command(
         )
     else:
         print(_sentence(answer))
-        print(f"margin {found:.3g}, {answer.unknowns} unknowns, {answer.rows} rows, {answer.seconds:.3f} s")
+        shown = "unknown" if margin is None else f"{margin:.3g}"
+        print(f"margin {shown}, {answer.unknowns} unknowns, {answer.rows} rows, {answer.seconds:.3f} s")
     return 0 if answer.verdict is Verdict.FEASIBLE else 1
 
 

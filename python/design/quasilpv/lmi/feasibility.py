@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
+from quasilpv.lmi.assembly import triangle_places
 from quasilpv.lmi.compiled import CompiledProblem, rounded
 from quasilpv.lmi.expressions import Variable
 from quasilpv.lmi.problem import Outcome
@@ -31,6 +32,8 @@ class Decision:
         outcome: `Outcome.VERIFIED` (proved, exact arithmetic), `Outcome.SOLVER_ONLY`, `Outcome.INFEASIBLE_NUMERICALLY`
             or `Outcome.UNKNOWN`.
         values: the proved point, one matrix per variable; empty otherwise.
+        margin: at that point, the smallest eigenvalue of all inequalities over the mean of all their eigenvalues, in
+            double: at most the largest margin there is (`quasilpv.lmi.margin`). NaN otherwise.
         excluded_norm: of a numerically infeasible problem: no x of smaller Euclidean norm satisfies ``F_k(x) >= I``,
             as far as the certificate was computed correctly. NaN otherwise.
         solver_status: in the solver's words.
@@ -39,6 +42,7 @@ class Decision:
 
     outcome: Outcome
     values: Mapping[Variable, FloatArray] = field(default_factory=dict)
+    margin: float = float("nan")
     excluded_norm: float = float("nan")
     solver_status: str = ""
     iterations: int = 0
@@ -67,13 +71,19 @@ def decide(problem: CompiledProblem) -> Decision:
     if np.all(np.isfinite(point)) and "Infeasible" not in status:
         candidate = rounded(point)
         if problem.holds_exactly(candidate):
-            return Decision(Outcome.VERIFIED, problem.values(candidate), np.nan, status, solution.iterations)
+            margin = _margin(problem, coefficients @ candidate)
+            return Decision(Outcome.VERIFIED, problem.values(candidate), margin, np.nan, status, solution.iterations)
         if status == "Solved":
-            return Decision(Outcome.SOLVER_ONLY, {}, np.nan, status, solution.iterations)
+            return Decision(Outcome.SOLVER_ONLY, solver_status=status, iterations=solution.iterations)
     if "PrimalInfeasible" in status:
         excluded = _excluded_norm(problem, coefficients, np.asarray(solution.z))
-        return Decision(Outcome.INFEASIBLE_NUMERICALLY, {}, excluded, status, solution.iterations)
-    return Decision(Outcome.UNKNOWN, {}, np.nan, status, solution.iterations)
+        return Decision(
+            Outcome.INFEASIBLE_NUMERICALLY,
+            excluded_norm=excluded,
+            solver_status=status,
+            iterations=solution.iterations,
+        )
+    return Decision(Outcome.UNKNOWN, solver_status=status, iterations=solution.iterations)
 
 
 def _solve(problem: CompiledProblem, coefficients: sparse.csc_matrix) -> clarabel.DefaultSolution:
@@ -86,6 +96,21 @@ def _solve(problem: CompiledProblem, coefficients: sparse.csc_matrix) -> clarabe
     settings.direct_solve_method = "faer"
     quadratic = sparse.csc_matrix((unknowns, unknowns))
     return clarabel.DefaultSolver(quadratic, np.zeros(unknowns), -coefficients, -identity, cones, settings).solve()
+
+
+def _margin(problem: CompiledProblem, entries: FloatArray) -> float:
+    """Smallest over mean eigenvalue; entries are the scaled upper triangles. Blocks of one order go together."""
+    layout = problem.layout
+    sizes = np.array(layout.sizes)
+    starts = np.concatenate([[0], np.cumsum(sizes * (sizes + 1) // 2)[:-1]])
+    smallest = np.inf
+    for size in np.unique(sizes).tolist():
+        i, j = triangle_places(size)
+        triangles = entries[starts[sizes == size][:, None] + np.arange(len(i))]
+        matrices = np.zeros((len(triangles), size, size))
+        matrices[:, j, i] = triangles * np.where(i == j, 1.0, np.sqrt(0.5))
+        smallest = min(smallest, float(np.linalg.eigvalsh(matrices)[:, 0].min()))
+    return smallest / (float(entries @ layout.diagonal) / int(sizes.sum()))
 
 
 def _excluded_norm(problem: CompiledProblem, coefficients: sparse.csc_matrix, dual: FloatArray) -> float:

@@ -17,8 +17,8 @@ from quasilpv.lmi.feasibility import decide
 from quasilpv.polytopes import PolytopicModel, polytopic_model
 from quasilpv.systems.catalogue import SYSTEMS, system
 
-SECOND_OPINION_UNKNOWNS = 2_000
-"""Larger problems are not put to the margin program when the first solver is undecided: it would take minutes."""
+MARGIN_PROGRAM_SIZE = 300_000
+"""Rows times unknowns; larger problems are not put to the margin program: it would take minutes."""
 
 
 class Verdict(StrEnum):
@@ -93,6 +93,7 @@ class Answer:
     Attributes:
         verdict: see `Verdict`.
         certified: the verdict is feasible and proved in exact arithmetic.
+        margin: of a feasible problem, see `quasilpv.lmi.feasibility.Decision`; None otherwise.
         excluded_norm: of an infeasible problem, how sure: no solution of smaller norm exists with all inequalities
             at least I, as far as the solver's certificate was computed correctly. None otherwise.
         unknowns, rows: scalar unknowns and rows (summed sizes) of the inequalities as solved.
@@ -101,6 +102,7 @@ class Answer:
 
     verdict: Verdict
     certified: bool
+    margin: float | None
     excluded_norm: float | None
     unknowns: int
     rows: int
@@ -137,12 +139,13 @@ class Sweep:
         decision = decide(compiled)
         outcome = decision.outcome
         unclear = outcome in {Outcome.UNKNOWN, Outcome.SOLVER_ONLY}
-        if unclear and compiled.layout.unknowns <= SECOND_OPINION_UNKNOWNS:
+        if unclear and _is_small(sum(compiled.layout.sizes), compiled.layout.unknowns):
             outcome = largest_margin(self.question.at(point).statement().problem).outcome
         return Answer(
             verdict=_VERDICTS.get(outcome, Verdict.UNKNOWN),
             certified=outcome is Outcome.VERIFIED,
-            excluded_norm=decision.excluded_norm if math.isfinite(decision.excluded_norm) else None,
+            margin=_finite(decision.margin),
+            excluded_norm=_finite(decision.excluded_norm),
             unknowns=compiled.layout.unknowns,
             rows=sum(compiled.layout.sizes),
             seconds=time.perf_counter() - start,
@@ -161,14 +164,22 @@ class Sweep:
         return compile_family(lambda point: self.question.at(point).statement().problem, base)
 
 
-def margin(question: Question, answer: Answer) -> float:
+def largest_or_reached_margin(question: Question, answer: Answer) -> float | None:
     """How far a question is from the edge between feasible and infeasible; see `quasilpv.lmi.margin`.
 
-    NaN for a problem too large for the margin program, or one it has no answer for.
+    Of a problem too large for the margin program, what the answer reached; None if it is not feasible.
     """
-    if answer.unknowns > SECOND_OPINION_UNKNOWNS:
-        return math.nan
-    return largest_margin(question.statement().problem).margin
+    if not _is_small(answer.rows, answer.unknowns):
+        return answer.margin
+    return _finite(largest_margin(question.statement().problem).margin)
+
+
+def _is_small(rows: int, unknowns: int) -> bool:
+    return rows * unknowns <= MARGIN_PROGRAM_SIZE
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 _VERDICTS = {Outcome.VERIFIED: Verdict.FEASIBLE, Outcome.INFEASIBLE_NUMERICALLY: Verdict.INFEASIBLE}
