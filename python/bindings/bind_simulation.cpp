@@ -51,6 +51,20 @@ class BoundPlant {
     return to_numpy(result);
   }
 
+  py::array_t<double> initial_state(const DoubleArray& angle, const DoubleArray& speed) const {
+    return to_numpy(
+        plant_->initial_state(to_joint_array(angle, joints(), "angle"), to_joint_array(speed, joints(), "speed")));
+  }
+
+  std::pair<py::array_t<double>, py::array_t<double>> make_consistent(double time_s, const DoubleArray& state,
+                                                                      const DoubleArray& torque) {
+    plant_->set_torque(to_joint_array(torque, joints(), "torque"));
+    Eigen::VectorXd consistent = to_vector(state, size(), "state");
+    Eigen::VectorXd derivative(size());
+    plant_->make_consistent(time_s, consistent, derivative);
+    return {to_numpy(consistent), to_numpy(derivative)};
+  }
+
   py::array_t<double> mass_matrix(const DoubleArray& angle) const {
     const auto* arm = dynamic_cast<const SerialArm*>(plant_.get());
     if (arm == nullptr) {
@@ -117,7 +131,11 @@ void bind_simulation(py::module_& module) {
       .def("residual", &BoundPlant::residual, py::arg("time_s"), py::arg("state"), py::arg("derivative"),
            py::arg("torque"), "F(t, y, y') under a control torque (N m), shape (size,).")
       .def("derivative", &BoundPlant::derivative, py::arg("time_s"), py::arg("state"), py::arg("torque"),
-           "Forward dynamics: y' that makes the residual zero, shape (size,).")
+           "Forward dynamics: y' of the differential components, 0 for multipliers, shape (size,).")
+      .def("initial_state", &BoundPlant::initial_state, py::arg("angle"), py::arg("speed"),
+           "y with the joints at these angles and speeds, shape (size,).")
+      .def("make_consistent", &BoundPlant::make_consistent, py::arg("time_s"), py::arg("state"), py::arg("torque"),
+           "(y, y') near a state that satisfy the equations and all constraints, multipliers included.")
       .def("mass_matrix", &BoundPlant::mass_matrix, py::arg("angle"), "M(theta), kg m^2, shape (joints, joints).");
 
   module.def("run_closed_loop", &run, py::arg("artifact"), py::arg("trajectory"), py::arg("scenario"),

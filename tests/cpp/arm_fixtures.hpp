@@ -35,7 +35,7 @@ inline SerialArmParameters three_link_arm(double friction_nm_s = 0.0) {
 inline SerialArmParameters random_arm(int joints, Uniform& uniform) {
   SerialArmParameters arm{"random", uniform(-15.0, 15.0), {}};
   for (int k = 0; k < joints; ++k) {
-    SerialArmLink link;
+    PlanarLink link;
     link.length_m = uniform(0.2, 1.5);
     link.mass_kg = uniform(0.1, 8.0);
     link.com_m = uniform(-0.3, 1.2) * link.length_m;

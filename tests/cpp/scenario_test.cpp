@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "quasilpv/document.hpp"
@@ -27,6 +29,33 @@ Json valid_document() {
     "sensors": {"encoder_bits": 20, "velocity_noise_rad_s": 0.05, "seed": 9007199254740991},
     "transport_delay_s": 0.0005,
     "initial": {"angle_rad": [0.1, 0.2], "speed_rad_s": [0.3, 0.4]}})");
+}
+
+Json with_plant(Json plant, int joints) {
+  Json document = valid_document();
+  document["plant"] = std::move(plant);
+  document["external_torque"][0]["joint"] = 0;
+  document["initial"] = {{"angle_rad", std::vector<double>{-0.8, 0.7}}, {"speed_rad_s", std::vector<double>{0.3, 0.4}}};
+  if (joints == 1) {
+    document["initial"] = {{"angle_rad", Json::array({-2.5})}, {"speed_rad_s", Json::array({5.0})}};
+  }
+  return document;
+}
+
+Json five_bar_document() {
+  return with_plant(Json::parse(R"({
+    "kind": "five-bar", "label": "legs", "gravity_m_s2": 9.81,
+    "active": {"length_m": 0.165, "mass_kg": 0.0825, "com_m": 0.08, "inertia_kg_m2": 0.0011, "friction_nm_s": 0.001},
+    "passive": {"length_m": 0.2, "mass_kg": 0.07, "com_m": 0.09, "inertia_kg_m2": 0.0007, "friction_nm_s": 0.002},
+    "spring_nm_rad": 2.0, "spring_rest_rad": [-0.9, 0.9], "formulation": "ggl", "baumgarte_per_s": 40.0})"),
+                    2);
+}
+
+Json spring_disc_document() {
+  return with_plant(Json::parse(R"({
+    "kind": "spring-disc", "label": "disc", "mass_kg": 0.1, "radius_m": 2.0, "inertia_kg_m2": 4.0,
+    "inertia_uncertainty_per_kg": 3.0, "stiffness_n_m": 1.5, "cubic_stiffness_n_m3": 2.5, "damping_n_s_m": 0.5})"),
+                    1);
 }
 
 std::string refusal(const Json& document) {
@@ -66,6 +95,41 @@ TEST(Scenario, every_member_arrives_where_it_belongs) {
   EXPECT_EQ(scenario.initial_speed, (JointArray{0.3, 0.4}));
 }
 
+TEST(Scenario, every_member_of_a_five_bar_arrives_where_it_belongs) {
+  const Scenario scenario = Scenario::parse(five_bar_document().dump(), "swing.json");
+  EXPECT_EQ(scenario.joints(), 2);
+  const auto& five_bar = std::get<FiveBarParameters>(scenario.plant);
+  EXPECT_EQ(five_bar.label, "legs");
+  EXPECT_EQ(five_bar.gravity_m_s2, 9.81);
+  EXPECT_EQ(five_bar.active.com_m, 0.08);
+  EXPECT_EQ(five_bar.active.friction_nm_s, 0.001);
+  EXPECT_EQ(five_bar.passive.length_m, 0.2);
+  EXPECT_EQ(five_bar.passive.mass_kg, 0.07);
+  EXPECT_EQ(five_bar.passive.inertia_kg_m2, 0.0007);
+  EXPECT_EQ(five_bar.spring_nm_rad, 2.0);
+  EXPECT_EQ(five_bar.spring_rest_rad, (std::array<double, 2>{-0.9, 0.9}));
+  EXPECT_EQ(five_bar.formulation, FiveBarFormulation::kGgl);
+  EXPECT_EQ(five_bar.baumgarte_per_s, 40.0);
+  EXPECT_EQ(scenario.make_plant()->size(), 12);
+  Json index1 = five_bar_document();
+  index1["plant"]["formulation"] = "index1";
+  EXPECT_EQ(Scenario::parse(index1.dump(), "swing.json").make_plant()->size(), 10);
+}
+
+TEST(Scenario, every_member_of_a_spring_disc_arrives_where_it_belongs) {
+  const Scenario scenario = Scenario::parse(spring_disc_document().dump(), "swing.json");
+  EXPECT_EQ(scenario.joints(), 1);
+  const auto& disc = std::get<SpringDiscParameters>(scenario.plant);
+  EXPECT_EQ(disc.label, "disc");
+  EXPECT_EQ(disc.mass_kg, 0.1);
+  EXPECT_EQ(disc.radius_m, 2.0);
+  EXPECT_EQ(disc.inertia_kg_m2, 4.0);
+  EXPECT_EQ(disc.inertia_uncertainty_per_kg, 3.0);
+  EXPECT_EQ(disc.stiffness_n_m, 1.5);
+  EXPECT_EQ(disc.cubic_stiffness_n_m3, 2.5);
+  EXPECT_EQ(disc.damping_n_s_m, 0.5);
+}
+
 TEST(Scenario, a_runge_kutta_integrator_is_read) {
   Json document = valid_document();
   document["integrator"] = {{"kind", "rk4"}, {"steps_per_sample", 4}};
@@ -84,12 +148,13 @@ struct BrokenRule {
   const char* pointer;
   Json value;
   const char* message;
+  Json (*document)() = valid_document;
 };
 
 class BrokenScenario : public ::testing::TestWithParam<BrokenRule> {};
 
 TEST_P(BrokenScenario, is_refused_in_one_line_naming_file_and_field) {
-  Json document = valid_document();
+  Json document = GetParam().document();
   document[Json::json_pointer(GetParam().pointer)] = GetParam().value;
   const std::string message = refusal(document);
   EXPECT_THAT(message, StartsWith("swing.json: "));
@@ -131,21 +196,36 @@ const std::vector<BrokenRule> kBrokenRules{
     {"/initial/angle_rad", Json::array({0.1}), "initial.angle_rad"},
     {"/initial/speed_rad_s", Json::array({0.1, 0.2, 0.3}), "initial.speed_rad_s"},
     {"/initial/speed_rad_s/1", "fast", "initial.speed_rad_s[1]"},
+    {"/plant/links", Json::array(), "links", five_bar_document},
+    {"/plant/formulation", "index3", "plant.formulation: got \"index3\", expected \"index1\" or", five_bar_document},
+    {"/plant/baumgarte_per_s", -1.0, "plant.baumgarte_per_s", five_bar_document},
+    {"/plant/spring_nm_rad", "stiff", "plant.spring_nm_rad", five_bar_document},
+    {"/plant/spring_rest_rad", Json::array({0.1}), "plant.spring_rest_rad", five_bar_document},
+    {"/plant/active/length_m", 0.0, "plant.active.length_m", five_bar_document},
+    {"/plant/active/colour", "red", "colour", five_bar_document},
+    {"/plant/passive/inertia_kg_m2", 0.0005, "plant.passive.inertia_kg_m2: got 0.0005, expected >= mass_kg com_m^2",
+     five_bar_document},
+    {"/external_torque/0/joint", 2, "external_torque[0].joint", five_bar_document},
+    {"/plant/colour", "red", "colour", spring_disc_document},
+    {"/plant/mass_kg", 0.0, "plant.mass_kg", spring_disc_document},
+    {"/plant/inertia_uncertainty_per_kg", -1.0, "plant.inertia_uncertainty_per_kg", spring_disc_document},
+    {"/initial/angle_rad", Json::array({0.1, 0.2}), "initial.angle_rad", spring_disc_document},
 };
 
 INSTANTIATE_TEST_SUITE_P(OneRuleAtATime, BrokenScenario, ::testing::ValuesIn(kBrokenRules));
 
 TEST(Scenario, when_any_member_is_missing_expect_refusal_naming_it) {
-  const Json complete = valid_document();
-  for (const auto& [key, value] : complete.items()) {
-    Json document = complete;
-    document.erase(key);
-    EXPECT_THAT(refusal(document), HasSubstr(key));
-    if (value.is_object()) {
-      for (const auto& [inner, unused] : value.items()) {
-        document = complete;
-        document[key].erase(inner);
-        EXPECT_THAT(refusal(document), HasSubstr(key + "." + inner));
+  for (const Json& complete : {valid_document(), five_bar_document(), spring_disc_document()}) {
+    for (const auto& [key, value] : complete.items()) {
+      Json document = complete;
+      document.erase(key);
+      EXPECT_THAT(refusal(document), HasSubstr(key));
+      if (value.is_object()) {
+        for (const auto& [inner, unused] : value.items()) {
+          document = complete;
+          document[key].erase(inner);
+          EXPECT_THAT(refusal(document), HasSubstr(key + "." + inner));
+        }
       }
     }
   }

@@ -41,7 +41,7 @@ CartesianEnergy<Scalar> cartesian_energy(const SerialArmParameters& arm, const s
   Scalar absolute_angle{}, absolute_speed{};
   Scalar height{}, velocity_x{}, velocity_y{};
   for (std::size_t k = 0; k < arm.links.size(); ++k) {
-    const SerialArmLink& link = arm.links[k];
+    const PlanarLink& link = arm.links[k];
     absolute_angle += angle[k];
     absolute_speed += speed[k];
     const Scalar along_x = absolute_speed * std::cos(absolute_angle);  // velocity of a point at distance 1

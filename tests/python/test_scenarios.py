@@ -4,16 +4,22 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from quasilpv import _runtime
 from quasilpv.errors import InputError
 from quasilpv.scenarios import (
+    FiveBarPlant,
     IdaIntegrator,
+    LinkParameters,
     Rk4Integrator,
     Scenario,
     Sensors,
+    SerialArmPlant,
+    SpringDiscPlant,
     build_scenario,
     read_scenario,
     tracking_task,
@@ -27,6 +33,11 @@ ARM3 = robot("arm3")
 TRAJECTORIES = {task.id: task.trajectory(ARM3.model, ARM3.domain) for task in tracking_tasks()}
 SQUARE = TRAJECTORIES["serial-square"]
 FORMATS = Path(__file__).parents[2] / "docs" / "reference" / "formats.md"
+
+
+def arm_of(scenario: Scenario) -> SerialArmPlant:
+    assert isinstance(scenario.plant, SerialArmPlant)
+    return scenario.plant
 
 
 def test_when_the_registry_is_listed_expect_the_two_tracking_experiments_of_the_serial_arm() -> None:
@@ -53,7 +64,7 @@ def test_when_a_scenario_is_built_expect_the_plant_to_start_at_rest_on_the_refer
 
 
 def test_when_the_plant_is_nominal_expect_table_i_4_and_hanging_equilibrium() -> None:
-    plant = build_scenario(ARM3, SQUARE, plant="nominal").plant
+    plant = arm_of(build_scenario(ARM3, SQUARE, plant="nominal"))
     assert (plant.kind, plant.label, plant.gravity_m_s2) == ("serial-arm", "nominal", 9.81)
     assert [link.length_m for link in plant.links] == [1.0, 0.9, 0.8]
     assert [link.mass_kg for link in plant.links] == [5.0, 4.9, 4.2]
@@ -62,8 +73,8 @@ def test_when_the_plant_is_nominal_expect_table_i_4_and_hanging_equilibrium() ->
 
 
 def test_when_the_plant_is_perturbed_expect_chapter_iv_with_inertias_about_the_centres_of_mass_unchanged() -> None:
-    nominal = build_scenario(ARM3, SQUARE, plant="nominal").plant.links
-    perturbed = build_scenario(ARM3, SQUARE).plant.links
+    nominal = arm_of(build_scenario(ARM3, SQUARE, plant="nominal")).links
+    perturbed = arm_of(build_scenario(ARM3, SQUARE)).links
     for before, after, factor in zip(nominal, perturbed, (1.4, 1.4, 2.2), strict=True):
         assert after.mass_kg == pytest.approx(factor * before.mass_kg)
         assert after.com_m == pytest.approx(factor * before.com_m)
@@ -104,6 +115,76 @@ def test_when_a_scenario_is_written_expect_the_same_one_back(
     assert read_scenario(write_scenario(tmp_path / "scenario.json", scenario)) == scenario
 
 
+def five_bar_document() -> dict[str, Any]:
+    active = LinkParameters(length_m=0.165, mass_kg=0.0825, com_m=0.0825, inertia_kg_m2=0.0011, friction_nm_s=0.0)
+    passive = active.model_copy(update={"inertia_kg_m2": 0.0007})
+    plant = FiveBarPlant(label="legs", gravity_m_s2=9.81, active=active, passive=passive)
+    return {
+        **build_scenario(ARM3, SQUARE).to_document(),
+        "plant": plant.model_dump(mode="json"),
+        "external_torque": [],
+        "initial": {"angle_rad": [-0.8, 0.8], "speed_rad_s": [0.0, 0.0]},
+    }
+
+
+def spring_disc_document() -> dict[str, Any]:
+    plant = SpringDiscPlant(
+        label="disc",
+        mass_kg=0.1,
+        radius_m=2.0,
+        inertia_kg_m2=4.0,
+        inertia_uncertainty_per_kg=3.0,
+        stiffness_n_m=1.0,
+        cubic_stiffness_n_m3=1.0,
+        damping_n_s_m=2.0,
+    )
+    return {
+        **build_scenario(ARM3, SQUARE).to_document(),
+        "plant": plant.model_dump(mode="json"),
+        "external_torque": [],
+        "initial": {"angle_rad": [-2.5], "speed_rad_s": [5.0]},
+    }
+
+
+@pytest.mark.parametrize(("make", "joints"), [(five_bar_document, 2), (spring_disc_document, 1)])
+def test_when_another_plant_is_written_expect_the_same_scenario_back_and_its_plant_in_the_runtime(
+    make: Callable[[], dict[str, Any]], joints: int, tmp_path: Path
+) -> None:
+    scenario = Scenario.from_document(make())
+    path = write_scenario(tmp_path / "scenario.json", scenario)
+    assert read_scenario(path) == scenario
+    assert scenario.plant.joints == joints
+    assert _runtime.Plant(_runtime.Scenario.load(str(path))).joints == joints
+
+
+@pytest.mark.parametrize(
+    ("make", "change", "field"),
+    [
+        (five_bar_document, lambda d: d["plant"].update(links=[]), "plant.links"),
+        (five_bar_document, lambda d: d["plant"].update(formulation="index3"), "plant.formulation"),
+        (five_bar_document, lambda d: d["plant"].update(baumgarte_per_s=-1), "plant.baumgarte_per_s"),
+        (five_bar_document, lambda d: d["plant"].update(spring_rest_rad=[0.1]), "plant.spring_rest_rad[1]"),
+        (five_bar_document, lambda d: d["plant"].pop("spring_nm_rad"), "plant.spring_nm_rad"),
+        (five_bar_document, lambda d: d["plant"]["passive"].update(inertia_kg_m2=1e-4), "plant.passive.inertia_kg_m2"),
+        (five_bar_document, lambda d: d["initial"].update(angle_rad=[0, 0, 0]), "initial.angle_rad"),
+        (spring_disc_document, lambda d: d["plant"].update(mass_kg=0), "plant.mass_kg"),
+        (spring_disc_document, lambda d: d["plant"].update(damping_n_s_m=-1), "plant.damping_n_s_m"),
+        (spring_disc_document, lambda d: d["initial"].update(angle_rad=[0, 0]), "initial.angle_rad"),
+    ],
+)
+def test_when_another_plant_breaks_a_rule_expect_its_field_in_both_languages(
+    make: Callable[[], dict[str, Any]], change: Callable[[dict[str, Any]], None], field: str
+) -> None:
+    document = make()
+    change(document)
+    with pytest.raises(InputError) as error:
+        Scenario.from_document(document, "scenario.json")
+    assert error.value.field == field
+    with pytest.raises(InputError) as error:
+        _runtime.Scenario.parse(json.dumps(document).encode(), "scenario.json")
+    assert error.value.field.startswith(field.removesuffix("[1]").removesuffix(".links"))
+
+
 def test_when_a_scenario_is_written_expect_exactly_the_members_the_format_documents() -> None:
     table = FORMATS.read_text().split("## Scenario")[1]
     documented = set(re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE))
@@ -117,7 +198,7 @@ def test_when_a_scenario_is_written_expect_exactly_the_members_the_format_docume
         (lambda d: d.update(schema_version=2), "schema_version"),
         (lambda d: d.update(comment="no"), "comment"),
         (lambda d: d.update(duration_s=0), "duration_s"),
-        (lambda d: d["plant"].update(kind="five-bar"), "plant.kind"),
+        (lambda d: d["plant"].update(kind="five-link"), "plant"),
         (lambda d: d["plant"].update(links=[]), "plant.links"),
         (lambda d: d["plant"]["links"][1].update(mass_kg=-1), "plant.links[1].mass_kg"),
         (lambda d: d["plant"]["links"][2].update(inertia_kg_m2=1.3), "plant.links[2].inertia_kg_m2"),

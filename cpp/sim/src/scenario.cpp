@@ -21,30 +21,6 @@ JointArray joint_array(const Field& field, int joints) {
   return array;
 }
 
-SerialArmParameters serial_arm(const Field& field, const std::string& source) {
-  field.only({"kind", "label", "gravity_m_s2", "links"});
-  SerialArmParameters arm;
-  arm.label = field["label"].text();
-  arm.gravity_m_s2 = field["gravity_m_s2"].number();
-  const Field links = field["links"];
-  for (std::size_t k = 0; k < links.size(); ++k) {
-    const Field link = links.at(k);
-    link.only({"length_m", "mass_kg", "com_m", "inertia_kg_m2", "friction_nm_s"});
-    arm.links.push_back({link["length_m"].number(), link["mass_kg"].number(), link["com_m"].number(),
-                         link["inertia_kg_m2"].number(), link["friction_nm_s"].number()});
-  }
-  check_serial_arm(arm, source, field.path());
-  return arm;
-}
-
-PlantParameters plant(const Field& field, const std::string& source) {
-  const std::string kind = field["kind"].text();
-  if (kind == "serial-arm") {
-    return serial_arm(field, source);
-  }
-  field["kind"].fail("\"" + kind + "\"", "\"serial-arm\"");
-}
-
 IntegratorOptions integrator(const Field& field) {
   const std::string kind = field["kind"].text();
   if (kind == "ida") {
@@ -81,9 +57,6 @@ SensorOptions sensors(const Field& field) {
   return options;
 }
 
-int joints_of(const SerialArmParameters& arm) { return static_cast<int>(arm.links.size()); }
-std::unique_ptr<Plant> make(const SerialArmParameters& arm) { return std::make_unique<SerialArm>(arm); }
-
 }  // namespace
 
 Scenario Scenario::load(const std::string& path) { return parse(read_file(path), path); }
@@ -101,7 +74,7 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
     root["name"].fail("an empty name", "a name");
   }
   scenario.duration_s = root["duration_s"].positive();
-  scenario.plant = quasilpv::plant(root["plant"], source);
+  scenario.plant = read_plant(root["plant"], source);
   const int n = scenario.joints();
   scenario.integrator = quasilpv::integrator(root["integrator"]);
   scenario.external_torque = quasilpv::external_torque(root["external_torque"], n);
@@ -114,12 +87,10 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
   return scenario;
 }
 
-int Scenario::joints() const {
-  return std::visit([](const auto& parameters) { return joints_of(parameters); }, plant);
-}
+int Scenario::joints() const { return quasilpv::make_plant(plant)->joints(); }
 
 std::unique_ptr<Plant> Scenario::make_plant() const {
-  std::unique_ptr<Plant> made = std::visit([](const auto& parameters) { return make(parameters); }, plant);
+  std::unique_ptr<Plant> made = quasilpv::make_plant(plant);
   made->set_external_torque(ExternalTorque(external_torque));
   return made;
 }

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <sstream>
 #include <utility>
 
+#include "format_number.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {
@@ -18,13 +18,6 @@ using JointMatrix = SerialArm::JointMatrix;
 // A pivot of the Cholesky factorisation of M is the inertia a joint has left when the joints before it are free to
 // move. Below this fraction of its diagonal entry, accelerations have lost all but four of their digits.
 constexpr double kSmallestPivotRatio = 1e-12;
-
-std::string text(double value) {
-  std::ostringstream out;
-  out.precision(9);
-  out << value;
-  return out.str();
-}
 
 // S x: relative joint rates -> absolute link rates.
 JointVector absolute(Plant::ConstVector relative) noexcept {
@@ -60,7 +53,7 @@ JointArray joint_array(Plant::ConstVector x) noexcept {
   return array;
 }
 
-double sum_of_masses_beyond(const std::vector<SerialArmLink>& links, std::size_t k) {
+double sum_of_masses_beyond(const std::vector<PlanarLink>& links, std::size_t k) {
   double sum = 0.0;
   for (std::size_t l = k + 1; l < links.size(); ++l) {
     sum += links[l].mass_kg;
@@ -69,11 +62,11 @@ double sum_of_masses_beyond(const std::vector<SerialArmLink>& links, std::size_t
 }
 
 // D of the class documentation, kg m^2.
-JointMatrix coupling_matrix(const std::vector<SerialArmLink>& links) {
+JointMatrix coupling_matrix(const std::vector<PlanarLink>& links) {
   const Eigen::Index n = static_cast<Eigen::Index>(links.size());
   JointMatrix coupling(n, n);
   for (Eigen::Index l = 0; l < n; ++l) {
-    const SerialArmLink& link = links[static_cast<std::size_t>(l)];
+    const PlanarLink& link = links[static_cast<std::size_t>(l)];
     const double mass_beyond = sum_of_masses_beyond(links, static_cast<std::size_t>(l));
     coupling(l, l) = link.inertia_kg_m2 + link.length_m * link.length_m * mass_beyond;
     for (Eigen::Index k = 0; k < l; ++k) {
@@ -94,25 +87,6 @@ bool is_positive_definite(const Eigen::LLT<JointMatrix>& cholesky, const JointMa
   return (pivots.array() > kSmallestPivotRatio * matrix.diagonal().array()).all();
 }
 
-void check_link(const SerialArmLink& link, const std::string& source, const std::string& path) {
-  const auto require = [&](bool holds, const char* field, double got, const std::string& expected) {
-    if (!holds) {
-      throw InputError(source, path + "." + field, text(got), expected);
-    }
-  };
-  require(std::isfinite(link.length_m) && link.length_m > 0.0, "length_m", link.length_m, "a number > 0");
-  require(std::isfinite(link.mass_kg) && link.mass_kg > 0.0, "mass_kg", link.mass_kg, "a number > 0");
-  require(std::isfinite(link.com_m), "com_m", link.com_m, "a finite number");
-  require(std::isfinite(link.friction_nm_s) && link.friction_nm_s >= 0.0, "friction_nm_s", link.friction_nm_s,
-          "a number >= 0 (viscous friction dissipates)");
-  require(std::isfinite(link.inertia_kg_m2) && link.inertia_kg_m2 > 0.0, "inertia_kg_m2", link.inertia_kg_m2,
-          "a number > 0 (indefinite inertia)");
-  // A point mass meets the bound with equality; its decimals may round to just below it.
-  const double point_mass_inertia = link.mass_kg * link.com_m * link.com_m;
-  require(link.inertia_kg_m2 >= point_mass_inertia * (1.0 - 1e-12), "inertia_kg_m2", link.inertia_kg_m2,
-          ">= mass_kg com_m^2 = " + text(point_mass_inertia) + " about the joint axis (indefinite inertia)");
-}
-
 }  // namespace
 
 // Sines and cosines of the absolute angles; those of their differences follow from the addition theorem.
@@ -128,7 +102,7 @@ struct SerialArm::Posture {
 
 void check_serial_arm(const SerialArmParameters& parameters, const std::string& source, const std::string& path) {
   if (!std::isfinite(parameters.gravity_m_s2)) {
-    throw InputError(source, path + ".gravity_m_s2", text(parameters.gravity_m_s2), "a finite number");
+    throw InputError(source, path + ".gravity_m_s2", format_number(parameters.gravity_m_s2), "a finite number");
   }
   const std::size_t n = parameters.links.size();
   if (n < 1 || n > static_cast<std::size_t>(kMaxJoints)) {
@@ -152,7 +126,7 @@ SerialArm::SerialArm(SerialArmParameters parameters) : parameters_(std::move(par
   gravity_moment_.resize(joints_);
   friction_.resize(joints_);
   for (std::size_t k = 0; k < parameters_.links.size(); ++k) {
-    const SerialArmLink& link = parameters_.links[k];
+    const PlanarLink& link = parameters_.links[k];
     const double first_moment = link.mass_kg * link.com_m + link.length_m * sum_of_masses_beyond(parameters_.links, k);
     gravity_moment_[static_cast<Eigen::Index>(k)] = parameters_.gravity_m_s2 * first_moment;
     friction_[static_cast<Eigen::Index>(k)] = link.friction_nm_s;
@@ -243,7 +217,7 @@ void SerialArm::derivative(double t, ConstVector y, Vector y_dot) const {
   const JointMatrix mass = mass_matrix(at);
   const Eigen::LLT<JointMatrix> cholesky(mass);
   if (!is_positive_definite(cholesky, mass)) {
-    throw PlantError("serial arm '" + parameters_.label + "': singular mass matrix at t = " + text(t) + " s");
+    throw PlantError("serial arm '" + parameters_.label + "': singular mass matrix at t = " + format_number(t) + " s");
   }
   const JointVector rest = JointVector::Zero(joints_);
   y_dot.head(joints_) = speed;

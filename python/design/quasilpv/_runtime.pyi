@@ -138,7 +138,13 @@ class Plant:
         """F(t, y, y') under a control torque (N m), shape (size,)."""
 
     def derivative(self, time_s: float, state: npt.ArrayLike, torque: npt.ArrayLike) -> _Array:
-        """Forward dynamics: y' that makes the residual zero, shape (size,)."""
+        """Forward dynamics: y' of the differential components, 0 for multipliers, shape (size,)."""
+
+    def initial_state(self, angle: npt.ArrayLike, speed: npt.ArrayLike) -> _Array:
+        """y with the joints at these angles and speeds, shape (size,)."""
+
+    def make_consistent(self, time_s: float, state: npt.ArrayLike, torque: npt.ArrayLike) -> tuple[_Array, _Array]:
+        """(y, y') near a state that satisfy the equations and all constraints, multipliers included."""
 
     def mass_matrix(self, angle: npt.ArrayLike) -> _Array:
         """M(theta), kg m^2, shape (joints, joints)."""

@@ -63,6 +63,57 @@ class SerialArmPlant(StrictModel):
     gravity_m_s2: float
     links: Annotated[tuple[LinkParameters, ...], Field(min_length=1, max_length=MAX_JOINTS)]
 
+    @property
+    def joints(self) -> int:
+        """Actuated and measured joints."""
+        return len(self.links)
+
+
+class FiveBarPlant(StrictModel):
+    """A planar five-bar: two equal legs, each an active link on the motor axis and a passive one to the tool.
+
+    Attributes:
+        active: link that a motor drives; its friction is that of the motor axis.
+        passive: link from the elbow to the tool; its friction is that of the elbow.
+        spring_nm_rad: stiffness of the torsion springs on the motor axis, relaxed at ``spring_rest_rad``.
+        formulation: ``index1``, or ``ggl`` for the stabilised index-2 form.
+        baumgarte_per_s: rate at which constraint errors decay in the form of index 1.
+    """
+
+    kind: Literal["five-bar"] = "five-bar"
+    label: str
+    gravity_m_s2: float
+    active: LinkParameters
+    passive: LinkParameters
+    spring_nm_rad: NonNegative = 0.0
+    spring_rest_rad: tuple[float, float] = (0.0, 0.0)
+    formulation: Literal["index1", "ggl"] = "index1"
+    baumgarte_per_s: NonNegative = 50.0
+
+    @property
+    def joints(self) -> int:
+        """Actuated and measured joints."""
+        return 2
+
+
+class SpringDiscPlant(StrictModel):
+    """A disc that rolls without slipping, held by a damper and a hardening spring; its joint is its own rotation."""
+
+    kind: Literal["spring-disc"] = "spring-disc"
+    label: str
+    mass_kg: Positive
+    radius_m: Positive
+    inertia_kg_m2: Positive
+    inertia_uncertainty_per_kg: NonNegative
+    stiffness_n_m: NonNegative
+    cubic_stiffness_n_m3: NonNegative
+    damping_n_s_m: NonNegative
+
+    @property
+    def joints(self) -> int:
+        """Actuated and measured joints."""
+        return 1
+
 
 class IdaIntegrator(StrictModel):
     """SUNDIALS IDA (variable-order BDF) with its error tolerances."""
@@ -103,7 +154,11 @@ class InitialState(StrictModel):
     speed_rad_s: Vector
 
 
+Plant = Annotated[SerialArmPlant | FiveBarPlant | SpringDiscPlant, Field(discriminator="kind")]
 Integrator = Annotated[IdaIntegrator | Rk4Integrator, Field(discriminator="kind")]
+
+TAGS = ("serial-arm", "five-bar", "spring-disc", "ida", "rk4")
+"""The kinds that tell the cases of a union apart."""
 
 EXTERNAL_TORQUE = tuple(
     SineTorque(joint=joint, amplitude_nm=amplitude, frequency_rad_s=15.0)
@@ -119,7 +174,7 @@ class Scenario(StrictModel):
     schema_version: Literal[1]
     name: Annotated[str, Field(min_length=1)]
     duration_s: Positive
-    plant: SerialArmPlant
+    plant: Plant
     integrator: Integrator
     external_torque: Annotated[tuple[SineTorque, ...], Field(max_length=1000)]
     sensors: Sensors
@@ -128,7 +183,7 @@ class Scenario(StrictModel):
 
     @model_validator(mode="after")
     def _check_joints(self) -> Self:
-        joints = len(self.plant.links)
+        joints = self.plant.joints
         for field in ("angle_rad", "speed_rad_s"):
             if len(getattr(self.initial, field)) != joints:
                 raise FieldError(f"initial.{field}", f"{len(getattr(self.initial, field))} entries", str(joints))
@@ -149,7 +204,7 @@ class Scenario(StrictModel):
         Raises:
             InputError: a rule of the format is broken; the message names the field.
         """
-        scenario = validate(cls, document, source, tags=("ida", "rk4"))
+        scenario = validate(cls, document, source, tags=TAGS)
         for path in _missing_members(document, scenario.to_document(), ""):
             raise InputError(source, path, "nothing", "this member")
         return scenario

@@ -4,20 +4,16 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
 #include "quasilpv/external_torque.hpp"
 #include "quasilpv/integrator.hpp"
 #include "quasilpv/plant.hpp"
+#include "quasilpv/plant_parameters.hpp"
 #include "quasilpv/sensors.hpp"
-#include "quasilpv/serial_arm.hpp"
 #include "quasilpv/step.hpp"
 
 namespace quasilpv {
-
-/// One alternative per plant kind of the scenario format.
-using PlantParameters = std::variant<SerialArmParameters>;
 
 /// A scenario document, validated.
 struct Scenario {

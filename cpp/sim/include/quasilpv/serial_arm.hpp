@@ -5,24 +5,16 @@
 #include <string>
 #include <vector>
 
+#include "quasilpv/planar_link.hpp"
 #include "quasilpv/plant.hpp"
 
 namespace quasilpv {
-
-/// One link of a planar arm.
-struct SerialArmLink {
-  double length_m = 0.0;       ///< L, from its joint to the next one (or to the tool)
-  double mass_kg = 0.0;        ///< m > 0
-  double com_m = 0.0;          ///< r, centre of mass from the joint, along the link
-  double inertia_kg_m2 = 0.0;  ///< I > 0 about the *joint axis*, at least m r^2 (parallel axis theorem)
-  double friction_nm_s = 0.0;  ///< f >= 0, viscous friction torque per joint speed
-};
 
 /// Physical parameters of an arm; 1 to 7 links.
 struct SerialArmParameters {
   std::string label;
   double gravity_m_s2 = 9.81;  ///< g; theta = 0 hangs for g > 0
-  std::vector<SerialArmLink> links;
+  std::vector<PlanarLink> links;
 };
 
 /// Checks parameters and names the first wrong one. The parallel axis bound I >= m r^2 with I > 0 makes the mass matrix
