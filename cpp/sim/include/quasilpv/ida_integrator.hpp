@@ -1,4 +1,4 @@
-// SUNDIALS IDA behind one class; ida_integrator.cpp is the only file that includes SUNDIALS.
+// SUNDIALS IDA behind one class; only ida_integrator.cpp and ida_kernels.cpp see SUNDIALS.
 #pragma once
 
 #include <memory>
