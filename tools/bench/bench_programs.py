@@ -1,4 +1,4 @@
-"""The compiled benchmark programs, and the experiment they are given: the perturbed 3-DoF arm draws the square."""
+"""The compiled benchmark programs, and the experiments they are given."""
 
 from __future__ import annotations
 
@@ -15,7 +15,17 @@ from bench_report import ROOT
 from quasilpv.artifact import write_artifact
 from quasilpv.errors import InputError, QuasilpvError
 from quasilpv.experiments.designs import kept_design
-from quasilpv.scenarios import build_scenario, write_scenario
+from quasilpv.scenarios import (
+    FiveBarPlant,
+    IdaIntegrator,
+    InitialState,
+    LinkParameters,
+    Scenario,
+    Sensors,
+    SineTorque,
+    build_scenario,
+    write_scenario,
+)
 from quasilpv.synthesis import Specification
 from quasilpv.systems.registry import robot
 from quasilpv.trajectories import serial_square
@@ -102,3 +112,25 @@ class Experiment:
         path = self.folder / "states.json"
         path.write_text(json.dumps(rows), encoding="utf-8")
         return path
+
+
+def five_bar_scenario(folder: Path) -> Path:
+    """Write the scenario of the five-bar of Dehak 2022 (IV.5.2) with passive links of 0.2 m, under a sine torque.
+
+    Unequal links, because with equal ones the constraint is linear in the angles, the easiest one to integrate.
+    """
+    active = LinkParameters(length_m=0.165, mass_kg=0.0825, com_m=0.0825, inertia_kg_m2=0.0011, friction_nm_s=0.0)
+    passive = active.model_copy(update={"length_m": 0.2, "inertia_kg_m2": 0.0007})
+    scenario = Scenario(
+        schema="quasilpv.scenario",
+        schema_version=1,
+        name="five-bar",
+        duration_s=3.0,
+        plant=FiveBarPlant(label="unequal links", gravity_m_s2=9.81, active=active, passive=passive),
+        integrator=IdaIntegrator(),
+        external_torque=(SineTorque(joint=0, amplitude_nm=15.0, frequency_rad_s=50.0),),
+        sensors=Sensors(encoder_bits=0, velocity_noise_rad_s=0.0),
+        transport_delay_s=0.0,
+        initial=InitialState(angle_rad=(-0.8, 0.8), speed_rad_s=(0.0, 0.0)),
+    )
+    return write_scenario(folder / "five-bar.json", scenario)
