@@ -21,8 +21,9 @@ from quasilpv.artifact import Artifact, write_artifact
 from quasilpv.certificate.exact_matrices import rational
 from quasilpv.certificate.gate import RobustGate, margin_curve, robust_gate
 from quasilpv.certificate.gate_cells import Cells, Pencil, are_positive_definite, cosine_enclosure
-from quasilpv.certificate.gate_data import arm_inertia_data, cosine_pairs, loop_data
+from quasilpv.certificate.gate_data import cosine_pairs, inertia_data, loop_data
 from quasilpv.certificate.gate_inertia import design_inertia, true_inertia
+from quasilpv.certificate.gate_mechanism import LinkData, SerialArmData
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_range
 from quasilpv.certificate.gate_rationals import to_float, to_floats
 from quasilpv.cli import run
@@ -32,6 +33,7 @@ from quasilpv.polytopes import BlockPolytope
 from quasilpv.systems.registry import Robot, robot
 from reference.gated_arms import arm4, artifact_document, growth_rate, multiple_pole_loop
 
+LINK = LinkData(length_m=1.0, mass_kg=1.0, com_m=0.5, inertia_kg_m2=0.5)
 LOOP = multiple_pole_loop(60, 1200, 1e-3, 1e-3)
 SCALE = 1.2
 ANSWER = {
@@ -76,15 +78,15 @@ def random_ratios(subject: Robot, count: int, seed: int) -> np.ndarray:
 # ---- the two inertias ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["arm2", "arm3", "arm4"])
+@pytest.mark.parametrize("name", ["arm2", "arm3", "arm4", "fivebar"])
 @pytest.mark.parametrize("fraction", [0.0, 0.3, 1.0])
 def test_when_inertias_are_rebuilt_from_the_artifact_expect_the_robots_own(name: str, fraction: float) -> None:
     subject = arm4() if name == "arm4" else robot(name)
-    data = arm_inertia_data(document(name))
+    data = inertia_data(document(name))
     theta = np.array([sum(interval) / 2 for interval in subject.domain.angle_rad])
-    alpha = np.cumsum(theta)
+    S = subject.model.absolute_map
+    alpha = S @ theta
     cosines = np.cos(alpha[:, None] - alpha[None, :])
-    S = np.tri(data.joints)
     D = np.array([[to_float(entry(rational(fraction))) for entry in row] for row in true_inertia(data)])
     assert S.T @ (D * cosines) @ S == pytest.approx(subject.with_payload_fraction(fraction).inertia(theta), rel=1e-12)
     collapsed = design_inertia(data)
@@ -101,12 +103,12 @@ def test_when_premises_share_a_block_expect_the_same_design_inertia_up_to_a_rest
     grouped = BlockPolytope.grouped(table["lower"], table["upper"], [[0], [1, 2]])
     vertices = grouped.vertices(SCALE * affine.constant, SCALE * affine.coefficients)
     changed["law"]["inertia"] = grouped.to_document(vertices)
-    ours, theirs = design_inertia(arm_inertia_data(document())), design_inertia(arm_inertia_data(changed))
+    ours, theirs = design_inertia(inertia_data(document())), design_inertia(inertia_data(changed))
     assert to_floats(theirs.constant) == pytest.approx(to_floats(ours.constant), abs=1e-12)
     for pair, slope in ours.slopes.items():
         assert to_floats(theirs.slopes[pair]) == pytest.approx(to_floats(slope), abs=1e-12)
     assert 0 < np.max(to_floats(theirs.rest)) < 1e-13
-    bounds = needed_range(InertiaPair(arm_inertia_data(changed)))
+    bounds = needed_range(InertiaPair(inertia_data(changed)))
     assert bounds is not None
     assert bounds.to_floats() == pytest.approx(proved_range("arm3").to_floats(), rel=1e-9)
 
@@ -174,7 +176,7 @@ def test_when_cells_shrink_expect_the_overestimate_to_shrink_with_their_square(s
 def test_when_a_cell_is_proved_definite_expect_no_sample_of_it_to_contradict(
     seed: int, depth: int, bound: float
 ) -> None:
-    inertia, rng = InertiaPair(arm_inertia_data(document())), np.random.default_rng(seed)
+    inertia, rng = InertiaPair(inertia_data(document())), np.random.default_rng(seed)
     cells = inertia.domain()
     for _ in range(3 * depth):
         cells = cells.halved(np.array([rng.integers(3)])).only(np.array([rng.integers(2)]))
@@ -185,7 +187,7 @@ def test_when_a_cell_is_proved_definite_expect_no_sample_of_it_to_contradict(
 
 
 def test_when_a_cell_is_small_expect_it_proved_up_to_its_own_largest_ratio() -> None:
-    inertia = InertiaPair(arm_inertia_data(document()))
+    inertia = InertiaPair(inertia_data(document()))
     whole = inertia.domain()
     level = np.full((1, 3), 8)
     cell = Cells(whole.lower, whole.upper, level, np.array([[200, 255, 255]]))
@@ -196,7 +198,7 @@ def test_when_a_cell_is_small_expect_it_proved_up_to_its_own_largest_ratio() -> 
         assert are_positive_definite(pencil, inertia.data.pairs, cell).tolist() == [expected]
 
 
-@pytest.mark.parametrize("name", ["arm2", "arm3", "arm4"])
+@pytest.mark.parametrize("name", ["arm2", "arm3", "arm4", "fivebar"])
 def test_when_5000_postures_and_payloads_are_drawn_expect_all_ratios_inside_and_the_bounds_tight(name: str) -> None:
     subject = arm4() if name == "arm4" else robot(name)
     needed = proved_range(name)
@@ -227,7 +229,7 @@ def test_when_the_arm_has_one_joint_expect_the_closed_form() -> None:
     single["programs"]["premises"] = {"outputs": 0, "code": []}
     block = {"kind": "box", "premises": [], "vertices": [[[link["inertia_kg_m2"]]]]}
     single["law"]["inertia"] = {"premises": 0, "lower": [], "upper": [], "centre": [], "blocks": [block]}
-    needed = needed_range(InertiaPair(arm_inertia_data(single)))
+    needed = needed_range(InertiaPair(inertia_data(single)))
     assert needed is not None
     first_moment = link["mass_kg"] * link["com_m"] ** 2
     highest = 1 + first_moment * (1.5 * 1.2**2 - 1) / link["inertia_kg_m2"]
@@ -259,7 +261,7 @@ def test_when_the_design_inertia_is_indefinite_in_a_posture_expect_no_range_and_
     ],
 )
 def test_when_premises_are_cosines_of_sums_expect_their_pairs(code: list[Any], pairs: tuple[Any, ...]) -> None:
-    assert cosine_pairs(code) == pairs
+    assert cosine_pairs(code, SerialArmData((LINK,) * 4).absolute_map) == pairs
 
 
 @pytest.mark.parametrize(
@@ -277,7 +279,7 @@ def test_when_premises_are_cosines_of_sums_expect_their_pairs(code: list[Any], p
 )
 def test_when_a_premise_is_no_cosine_of_neighbouring_angles_expect_it_refused(code: list[Any]) -> None:
     with pytest.raises(InputError, match=r"programs\.premises"):
-        cosine_pairs(code)
+        cosine_pairs(code, SerialArmData((LINK,) * 4).absolute_map)
 
 
 Change = Callable[[dict[str, Any]], object]
@@ -308,7 +310,7 @@ def test_when_an_artifact_does_not_fit_the_gate_expect_the_field_named(damage: s
 # ---- the gate --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["arm2", "arm3", "arm4"])
+@pytest.mark.parametrize("name", ["arm2", "arm3", "arm4", "fivebar"])
 def test_when_a_sound_design_meets_the_gate_expect_it_passed_and_proved(name: str) -> None:
     verdict = gate(name).to_document()
     assert verdict["passed"] is True

@@ -28,7 +28,7 @@ from quasilpv.trajectories import (
 )
 from quasilpv.trajectories.library import CIRCLE, SQUARE
 from quasilpv.trajectories.paths import MAX_DURATION_S, ArcSegment, LineSegment, Segment, septic
-from quasilpv.trajectories.planning import MIN_ELBOW_SINE, joint_motion, quintic_hermite
+from quasilpv.trajectories.planning import MIN_SINGULARITY, joint_motion, quintic_hermite
 
 ARM = robot("arm3").model
 L1, L2, L3 = 1.0, 0.9, 0.8
@@ -247,7 +247,7 @@ def test_when_the_first_joint_passes_half_a_turn_expect_no_jump() -> None:
             None,
             "segments[1] at t = ",
             "|sin(theta_2)| = 0.0",
-            f"at least {MIN_ELBOW_SINE}",
+            f"at least {MIN_SINGULARITY}",
         ),
         (
             SQUARE,

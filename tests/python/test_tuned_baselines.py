@@ -188,7 +188,7 @@ def test_when_the_gains_of_the_thesis_meet_the_same_bounds_expect_only_computed_
     controller: str, admissible: bool
 ) -> None:
     observer = {"ctc-dob-tuned": baselines.DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S}.get(controller, 0.0)
-    rate, gain, activity = performance(controller, baselines.Tuning(observer_bandwidth_rad_s=observer))
+    rate, gain, activity = performance(controller, baselines.Tuning.printed(robot("arm3"), observer))
     bound = 0.15 * np.linalg.norm(robot("arm3").limits.torque_nm)
     assert (rate < 0.0 and activity <= bound) == admissible
     if admissible:

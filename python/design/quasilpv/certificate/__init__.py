@@ -65,7 +65,7 @@ def verify(document: Mapping[str, Any], source: str = "artifact") -> Verificatio
         source: what to call it in errors.
 
     Raises:
-        InputError: the law kind makes no claim, the witness is missing or malformed, or the robot is no serial arm.
+        InputError: the law kind makes no claim, the witness is missing or malformed, or the robot is not known.
     """
     start = time.perf_counter()
     kind = document["law"]["kind"]

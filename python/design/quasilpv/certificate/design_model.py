@@ -2,9 +2,9 @@
 
 The inequalities of a law are about the box and the inertia of its tables. Two claims tie these to the robot:
 
-* **premise box**: every premise is the cosine of a sum of joint angles; its range over the operating domain, enclosed
-  in ball arithmetic, lies in the box the run-time side clamps it to.
-* **inertia table**: for every premise vector of the box, the table is s times the inertia of the links in the artifact,
+* **premise box**: every premise is the cosine of a difference of absolute angles; its range over the operating domain,
+  enclosed in ball arithmetic, lies in the box the run-time side clamps it to.
+* **inertia table**: for every premise vector of the box, the table is s times the inertia of the robot in the artifact,
   s > 0 one number, entry by entry within `ROUNDING` of its diagonal; a cosine that is not scheduled is held at a value
   it takes on the operating domain.
 
@@ -22,8 +22,8 @@ from flint import fmpq, fmpq_mat
 
 from quasilpv.certificate.claims import Claim
 from quasilpv.certificate.exact_matrices import magnitude, rational, zero
-from quasilpv.certificate.gate_data import arm_inertia_data
-from quasilpv.certificate.gate_inertia import ArmInertiaData, Pair, design_inertia, true_inertia
+from quasilpv.certificate.gate_data import inertia_data
+from quasilpv.certificate.gate_inertia import InertiaData, Pair, design_inertia, true_inertia
 from quasilpv.certificate.gate_range import cosine_range
 from quasilpv.certificate.gate_rationals import to_float
 
@@ -32,26 +32,26 @@ ROUNDING = fmpq(1, 1 << 40)
 
 
 def check_design_model(document: Mapping[str, Any]) -> tuple[Claim, ...]:
-    """Claims of an artifact of a planar serial arm, given as its document.
+    """Claims of an artifact, given as its document.
 
     Raises:
-        InputError: another robot, or a premise that is not the cosine of a sum of neighbouring joint angles.
+        InputError: the robot is not known, or a premise is not the cosine of a difference of absolute angles.
         KeyError, TypeError, ValueError: the document is not of the documented form.
     """
-    data = arm_inertia_data(document)
+    data = inertia_data(document)
     return (*_coverage_claims(data), *_inertia_claims(data))
 
 
-def _coverage_claims(data: ArmInertiaData) -> Iterator[Claim]:
+def _coverage_claims(data: InertiaData) -> Iterator[Claim]:
     for p, pair in enumerate(data.premise_pairs):
         below, above = cosine_range(data, pair)
         lower, upper = rational(data.premise_lower[p]), rational(data.premise_upper[p])
         beyond = max(lower - below, above - upper)
         margin = 1.0 if beyond <= 0 else max(-1.0, -to_float(beyond / (upper - lower)))
-        yield Claim(f"premise box: {_cosine(pair)} on the operating domain", beyond <= 0, margin)
+        yield Claim(f"premise box: {_cosine(data, pair)} on the operating domain", beyond <= 0, margin)
 
 
-def _inertia_claims(data: ArmInertiaData) -> Iterator[Claim]:
+def _inertia_claims(data: InertiaData) -> Iterator[Claim]:
     """The value of each cosine that is not scheduled, and proportionality of everything else."""
     n, table, nominal = data.joints, design_inertia(data), true_inertia(data)
     robot = fmpq_mat(n, n, [nominal[i][j](fmpq(0)) for i, j in product(range(n), repeat=2)])
@@ -64,7 +64,7 @@ def _inertia_claims(data: ArmInertiaData) -> Iterator[Claim]:
         below, above = cosine_range(data, pair)
         held = table.constant[pair] / (scale * robot[pair])
         inside = min(held - below, above - held) / (above - below)
-        title = f"inertia table: {_cosine(pair)} held at {to_float(held):.4g}, a value it takes"
+        title = f"inertia table: {_cosine(data, pair)} held at {to_float(held):.4g}, a value it takes"
         yield Claim(title, inside >= 0, max(-1.0, to_float(inside)))
         constant -= _only(table.constant, pair)
     error = table.rest + magnitude(constant)
@@ -90,6 +90,11 @@ def _only(square: fmpq_mat, pair: Pair) -> fmpq_mat:
     return chosen
 
 
-def _cosine(pair: Pair) -> str:
+def _cosine(data: InertiaData, pair: Pair) -> str:
+    """``cos(alpha_j - alpha_i)`` in joint angles, e.g. ``cos(theta_2 + theta_3)``."""
+    S = data.mechanism.absolute_map.table()
     i, j = pair
-    return f"cos({' + '.join(f'theta_{k}' for k in range(i + 2, j + 2))})"
+    factors = [(joint, after - before) for joint, (before, after) in enumerate(zip(S[i], S[j], strict=True), start=1)]
+    added = " + ".join(f"theta_{joint}" for joint, factor in factors if factor > 0)
+    subtracted = "".join(f" - theta_{joint}" for joint, factor in factors if factor < 0)
+    return f"cos({added}{subtracted})"

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from flint import fmpq, fmpq_poly
 
-from quasilpv.certificate.gate_data import HALF_A_SAMPLE, arm_inertia_data, loop_data
+from quasilpv.certificate.gate_data import HALF_A_SAMPLE, inertia_data, loop_data
 from quasilpv.certificate.gate_delay import DelayMargin, delay_margin
 from quasilpv.certificate.gate_loop import AccelerationLoopData, CharacteristicPolynomial, Controller
 from quasilpv.certificate.gate_margin import InertiaMargin, inertia_margin
@@ -109,11 +109,11 @@ def robust_gate(
         delay_samples: the transport delay it has to tolerate, in samples.
 
     Raises:
-        InputError: another law than `dob-acceleration`, another robot than a planar serial arm, or data that contradict
+        InputError: another law than `dob-acceleration`, a robot the gate does not know, or data that contradict
             each other.
     """
     loop = loop_data(document, source)
-    inertia = InertiaPair(arm_inertia_data(document, source))
+    inertia = InertiaPair(inertia_data(document, source))
     margin, needed = inertia_margin(loop, delay_samples), needed_range(inertia)
     if needed is None:
         return RobustGate(loop, delay_samples, margin, None, None, None)

@@ -1,11 +1,12 @@
 """Positive definiteness of an inertia-like matrix over a box of postures and payloads: one cell at a time.
 
-A `Pencil` is ``X(theta, f) = sum_p f^p (K_p0 + sum_k cos(s_k) K_pk)``, symmetric, cubic in the payload fraction f, with
-``s_k = theta_{i+1} + ... + theta_j`` for the pair (i, j) of cosine k, up to a symmetric error no entry of which exceeds
-``rest``. A cell is ``theta_a = middle_a +- h_a`` and f in [u, v]. With X_0 ... X_3 the Bernstein coefficients of X in f
+A posture is n - 1 angles delta, the differences of neighbouring absolute angles (of a serial arm theta_2 ... theta_n).
+A `Pencil` is ``X(delta, f) = sum_p f^p (K_p0 + sum_k cos(s_k) K_pk)``, symmetric, cubic in the payload fraction f, with
+``s_k = delta_{i+1} + ... + delta_j`` for the pair (i, j) of cosine k, up to a symmetric error no entry of which exceeds
+``rest``. A cell is ``delta_a = middle_a +- h_a`` and f in [u, v]. With X_0 ... X_3 the Bernstein coefficients of X in f
 on [u, v], X > 0 on the whole cell if for each of them and for every corner sigma (a sign per angle)
 
-    X_j(middle) + sum_a sigma_a h_a dX_j/dtheta_a (middle) - diag(r_j) > 0,
+    X_j(middle) + sum_a sigma_a h_a dX_j/ddelta_a (middle) - diag(r_j) > 0,
 
     r_j = row sums of  rest + sum_k H_k^2 / 2 |K_jk|   (entrywise),   H_k = h_{i+1} + ... + h_j:
 
@@ -87,7 +88,7 @@ class Cells:
     """N boxes of a bisected domain: on axis a, box i is the part ``index[i, a]`` of ``2^level[i, a]`` equal ones.
 
     Attributes:
-        lower: rational lower bounds of the domain, one per axis: theta_2 ... theta_n, then f.
+        lower: rational lower bounds of the domain, one per axis: the angles of the posture, then f.
         upper: upper bounds.
         level: (N, axes) integers.
         index: (N, axes) integers.
@@ -140,7 +141,7 @@ def smallest_eigenvalues(
 
     Args:
         pencil: `Pencil.to_floats`.
-        pairs: cosine k is ``cos(theta_{i+1} + ... + theta_j)`` for its pair (i, j).
+        pairs: cosine k is ``cos(delta_{i+1} + ... + delta_j)`` for its pair (i, j).
         cells: N cells.
     """
     K, rest = pencil
@@ -242,7 +243,7 @@ def _rounded_down(ball: arb) -> int:
 
 
 def _pair_matrix(pairs: Sequence[Pair], angles: int) -> FloatArray:
-    """Zeros and ones, (angles, m): column k sums the angles theta_{i+1} ... theta_j of pair k."""
+    """Zeros and ones, (angles, m): column k sums the angles delta_{i+1} ... delta_j of pair k."""
     sums = np.zeros((angles, len(pairs)))
     for k, (i, j) in enumerate(pairs):
         sums[i:j, k] = 1.0

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from flint import fmpq
+from flint import fmpq, fmpq_mat
 
-from quasilpv.certificate.gate_inertia import ArmInertiaData, InertiaBlock, LinkData, Pair
+from quasilpv.certificate.gate_inertia import InertiaBlock, InertiaData, Pair
 from quasilpv.certificate.gate_loop import AccelerationLoopData
+from quasilpv.certificate.gate_mechanism import mechanism_data
 from quasilpv.errors import InputError
 
 LAW_KIND = "dob-acceleration"
@@ -55,7 +56,7 @@ def loop_data(document: Mapping[str, Any], source: str = "artifact") -> Accelera
     )
 
 
-def arm_inertia_data(document: Mapping[str, Any], source: str = "artifact") -> ArmInertiaData:
+def inertia_data(document: Mapping[str, Any], source: str = "artifact") -> InertiaData:
     """The true and the design inertia of an artifact.
 
     Args:
@@ -63,26 +64,24 @@ def arm_inertia_data(document: Mapping[str, Any], source: str = "artifact") -> A
         source: what to call it in errors.
 
     Raises:
-        InputError: the robot is no planar serial arm, the payload set is another one than `PAYLOAD_RULE` describes, or
-            a premise is not the cosine of a sum of neighbouring joint angles.
+        InputError: the robot is none of `gate_mechanism`, the payload set is another one than `PAYLOAD_RULE` describes,
+            or a premise is not the cosine of a difference of absolute angles.
     """
-    links = document["robot"]["parameters"].get("links")
-    if not links:
-        raise InputError(source, "robot.parameters.links", links, "the links of a planar serial arm")
+    mechanism = mechanism_data(document["robot"]["parameters"], source)
     payloads = document["payloads"]
     for field, rule in PAYLOAD_RULE.items():
         if payloads.get(field) != rule:
             raise InputError(source, f"payloads.{field}", payloads.get(field), str(rule))
     inertia = document["law"]["inertia"]
     premises = document["programs"]["premises"]["code"]
-    return ArmInertiaData(
-        links=tuple(LinkData(*(float(link[field]) for field in LinkData.__annotations__)) for link in links),
+    return InertiaData(
+        mechanism=mechanism,
         mass_scale=tuple(map(float, payloads["mass_scale"])),
         com_scale=tuple(map(float, payloads["com_scale"])),
         angle_rad=tuple((float(low), float(high)) for low, high in document["domain"]["angle_rad"]),
         premise_lower=tuple(map(float, inertia["lower"])),
         premise_upper=tuple(map(float, inertia["upper"])),
-        premise_pairs=cosine_pairs(premises, source),
+        premise_pairs=cosine_pairs(premises, mechanism.absolute_map, source),
         blocks=tuple(
             InertiaBlock(
                 tuple(block["premises"]),
@@ -93,14 +92,15 @@ def arm_inertia_data(document: Mapping[str, Any], source: str = "artifact") -> A
     )
 
 
-def cosine_pairs(code: Sequence[Sequence[Any]], source: str = "artifact") -> tuple[Pair, ...]:
+def cosine_pairs(code: Sequence[Sequence[Any]], absolute_map: fmpq_mat, source: str = "artifact") -> tuple[Pair, ...]:
     """Read off a program of premises which cosine each of its outputs is.
 
     The program is run on sums of joint angles instead of numbers: it may add, subtract and negate angles, and take
-    cosines ``cos(theta_{k+1} + ... + theta_l) = cos(alpha_l - alpha_k)`` of neighbouring ones.
+    cosines ``cos(alpha_l - alpha_k)`` of differences of absolute angles.
 
     Args:
         code: the postfix program, as in an artifact.
+        absolute_map: S, ``alpha = S theta``.
         source: what to call it in errors.
 
     Returns:
@@ -121,7 +121,7 @@ def cosine_pairs(code: Sequence[Sequence[Any]], source: str = "artifact") -> tup
                 right = angles.pop()
                 angles.append(_combined(angles.pop(), 1 if name == "add" else -1, right))
             case "cos" if len(angles) == 1:
-                pairs.append(_pair(angles.pop(), source))
+                pairs.append(_pair(angles.pop(), absolute_map, source))
             case _:
                 raise InputError(source, "programs.premises", name, "only cosines of sums of joint angles")
     if angles:
@@ -135,11 +135,13 @@ def _combined(left: Mapping[int, int], sign: int, right: Mapping[int, int]) -> d
     return {joint: factor for joint, factor in total.items() if factor}
 
 
-def _pair(angle: Mapping[int, int], source: str) -> Pair:
-    """The pair of a sum of neighbouring joint angles; a cosine does not see the sign of the sum."""
-    joints = sorted(angle)
-    neighbours = joints and joints == list(range(joints[0], joints[-1] + 1)) and joints[0] > 0
-    if not neighbours or set(angle.values()) not in ({1}, {-1}):
-        got = " ".join(f"{factor:+d} theta_{joint + 1}" for joint, factor in sorted(angle.items()))
-        raise InputError(source, "programs.premises", f"cos({got})", "a sum of neighbouring angles after the first")
-    return joints[0] - 1, joints[-1]
+def _pair(angle: Mapping[int, int], absolute_map: fmpq_mat, source: str) -> Pair:
+    """The pair of a difference of absolute angles; a cosine does not see its sign."""
+    n = absolute_map.nrows()
+    if all(joint < n for joint in angle):
+        multiples = (fmpq_mat(1, n, [angle.get(joint, 0) for joint in range(n)]) * absolute_map.inv()).entries()
+        involved = [k for k, factor in enumerate(multiples) if factor]
+        if len(involved) == 2 and sorted(multiples[k] for k in involved) == [-1, 1]:
+            return involved[0], involved[1]
+    got = " ".join(f"{factor:+d} theta_{joint + 1}" for joint, factor in sorted(angle.items()))
+    raise InputError(source, "programs.premises", f"cos({got})", "the cosine of a difference of absolute link angles")

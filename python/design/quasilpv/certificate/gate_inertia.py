@@ -1,40 +1,30 @@
-"""The true and the design inertia of a planar serial arm as exact data: affine in cosines, cubic in the payload.
+"""The true and the design inertia of a robot as exact data: affine in cosines, cubic in the payload.
 
-In absolute angles ``alpha_k = theta_1 + ... + theta_k`` (``alpha = S theta``, S the lower triangle of ones) the inertia
-of the arm is ``M_t = S' [D_kl(f) cos(alpha_k - alpha_l)] S`` with
-
-    D_kk = I_k + L_k^2 sum_{l>k} m_l,    D_kl = L_k (m_l r_l + L_l sum_{p>l} m_p)  for k < l
-
-(I_k about the joint axis), where at payload fraction f link i has mass ``m_i (1 + f (mass_scale_i - 1))``, centre of
-mass ``r_i (1 + f (com_scale_i - 1))`` and the nominal moment of inertia about its centre of mass, so that D is a cubic
-in f. The design inertia M_n is collapsed from the artifact's vertices, not from what they were made of. Definiteness
-does not change under the congruence with S, and everything here is in absolute angles.
+The true inertia is that of `gate_mechanism`, ``M_t = S' [D_kl(f) cos(alpha_k - alpha_l)] S`` in absolute angles
+``alpha = S theta``, D cubic in the payload fraction f. The design inertia M_n is collapsed from the artifact's
+vertices, not from what they were made of. Definiteness does not change under the congruence with S, and everything here
+is in absolute angles.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import TypeAlias
 
-from flint import fmpq_mat, fmpq_poly
+import numpy as np
+import numpy.typing as npt
+from flint import fmpq, fmpq_mat, fmpq_poly
 
 from quasilpv.certificate.exact_matrices import is_symmetric, magnitude, matrix, rational, zero
+from quasilpv.certificate.gate_mechanism import MechanismData
+from quasilpv.certificate.gate_rationals import to_floats
 from quasilpv.errors import InputError
 
+FloatArray: TypeAlias = npt.NDArray[np.float64]
 Pair: TypeAlias = tuple[int, int]
 Interval: TypeAlias = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class LinkData:
-    """One link: length, mass, centre of mass and moment of inertia about the joint axis, SI units."""
-
-    length_m: float
-    mass_kg: float
-    com_m: float
-    inertia_kg_m2: float
 
 
 @dataclass(frozen=True)
@@ -46,13 +36,13 @@ class InertiaBlock:
 
 
 @dataclass(frozen=True)
-class ArmInertiaData:
+class InertiaData:
     """What the needed range of inertia ratios depends on, as shipped.
 
     Attributes:
-        links: nominal links, base to tool.
-        mass_scale: n factors of the masses at payload fraction 1.
-        com_scale: n factors of the distances to the centres of mass at payload fraction 1.
+        mechanism: the nominal robot.
+        mass_scale: n factors of masses at payload fraction 1.
+        com_scale: n factors of distances to the centres of mass at payload fraction 1.
         angle_rad: n intervals of the joint angles, the operating domain.
         premise_lower: lower bounds the run-time clamps the premises to.
         premise_upper: upper bounds.
@@ -63,7 +53,7 @@ class ArmInertiaData:
         InputError: sizes that do not fit, or a vertex that is not exactly symmetric: then the joints do not decouple.
     """
 
-    links: tuple[LinkData, ...]
+    mechanism: MechanismData
     mass_scale: tuple[float, ...]
     com_scale: tuple[float, ...]
     angle_rad: tuple[Interval, ...]
@@ -73,8 +63,8 @@ class ArmInertiaData:
     blocks: tuple[InertiaBlock, ...]
 
     def __post_init__(self) -> None:
-        """Refuse data that describe no arm with a design inertia."""
-        n, premises = len(self.links), len(self.premise_pairs)
+        """Refuse data that describe no robot with a design inertia."""
+        n, premises = self.joints, len(self.premise_pairs)
         for field, size in (
             ("mass_scale", n),
             ("com_scale", n),
@@ -83,7 +73,7 @@ class ArmInertiaData:
             ("premise_upper", premises),
         ):
             if len(getattr(self, field)) != size:
-                raise InputError("arm", field, len(getattr(self, field)), f"{size} entries")
+                raise InputError("robot", field, len(getattr(self, field)), f"{size} entries")
         for index, block in enumerate(self.blocks):
             for vertex in block.vertices:
                 if len(vertex) != n or not is_symmetric(matrix(vertex)):
@@ -92,7 +82,42 @@ class ArmInertiaData:
     @property
     def joints(self) -> int:
         """Number of joints n."""
-        return len(self.links)
+        return self.mechanism.joints
+
+    @property
+    def turns_as_one(self) -> bool:
+        """Whether the first joint turns all links alike, so that the inertia does not depend on it."""
+        return all(row[0] == 1 for row in self.mechanism.absolute_map.table())
+
+    @property
+    def relative_rad(self) -> tuple[tuple[fmpq, fmpq], ...]:
+        """n - 1 intervals of ``alpha_{k+1} - alpha_k`` over the operating domain: all that inertias depend on."""
+        S = self.mechanism.absolute_map.table()
+        bounds = [tuple(map(rational, interval)) for interval in self.angle_rad]
+        intervals = []
+        for before, after in pairwise(S):
+            ends = [
+                (factor * low, factor * high) if factor >= 0 else (factor * high, factor * low)
+                for factor, (low, high) in zip((b - a for a, b in zip(before, after, strict=True)), bounds, strict=True)
+            ]
+            intervals.append((sum((low for low, _ in ends), fmpq(0)), sum((high for _, high in ends), fmpq(0))))
+        return tuple(intervals)
+
+    def absolute(self, angles: FloatArray) -> FloatArray:
+        """Absolute angles in doubles, (N, n), at joint angles (N, n)."""
+        return np.asarray(angles @ to_floats(self.mechanism.absolute_map).T)
+
+    def configuration(self, relative: FloatArray) -> tuple[float, ...]:
+        """Joint angles of the operating domain at which ``alpha_{k+1} - alpha_k`` take these n - 1 values.
+
+        They are known up to a common shift of the absolute angles, which stays in the middle of what the domain allows.
+        """
+        inverse = to_floats(self.mechanism.absolute_map.inv())
+        angle, shift = inverse @ np.concatenate([[0.0], np.cumsum(relative)]), inverse.sum(axis=1)
+        moved = shift != 0.0
+        ends = (np.array(self.angle_rad)[moved] - angle[moved, None]) / shift[moved, None]
+        middle = (ends.min(axis=1).max() + ends.max(axis=1).min()) / 2.0
+        return tuple(map(float, angle + middle * shift))
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -116,36 +141,20 @@ class DesignInertia:
     rest: fmpq_mat
 
 
-def true_inertia(data: ArmInertiaData) -> list[list[fmpq_poly]]:
+def true_inertia(data: InertiaData) -> list[list[fmpq_poly]]:
     """The n x n matrix D of the module's formula, polynomials of degree at most 3 in the payload fraction."""
-    n = data.joints
-    mass, first_moment, inertia = [], [], []
-    for link, mass_scale, com_scale in zip(data.links, data.mass_scale, data.com_scale, strict=True):
-        m, r = rational(link.mass_kg), rational(link.com_m)
-        loaded_mass = m * fmpq_poly([1, rational(mass_scale) - 1])
-        loaded_com = r * fmpq_poly([1, rational(com_scale) - 1])
-        mass.append(loaded_mass)
-        first_moment.append(loaded_mass * loaded_com)
-        inertia.append(rational(link.inertia_kg_m2) - m * r**2 + loaded_mass * loaded_com**2)
-    length = [rational(link.length_m) for link in data.links]
-    outer = [sum(mass[k + 1 :], fmpq_poly([0])) for k in range(n)]
-    D = [[fmpq_poly([0])] * n for _ in range(n)]
-    for k in range(n):
-        D[k][k] = inertia[k] + length[k] ** 2 * outer[k]
-        for j in range(k):
-            D[j][k] = D[k][j] = length[j] * (first_moment[k] + length[k] * outer[k])
-    return D
+    return data.mechanism.inertia(data.mass_scale, data.com_scale)
 
 
-def design_inertia(data: ArmInertiaData) -> DesignInertia:
+def design_inertia(data: InertiaData) -> DesignInertia:
     """Collapse the vertices: every block's weights are products over its premises, divided by the number of blocks."""
     n = data.joints
-    to_relative = fmpq_mat(n, n, [int(j <= i) for i in range(n) for j in range(n)]).inv()
+    to_joints = data.mechanism.absolute_map.inv()
     constant, rest = zero(n, n), zero(n, n)
     slopes = {pair: zero(n, n) for pair in data.premise_pairs}
     for block in data.blocks:
         for premises, coefficient in _monomials(data, block).items():
-            absolute = to_relative.transpose() * coefficient * to_relative / len(data.blocks)
+            absolute = to_joints.transpose() * coefficient * to_joints / len(data.blocks)
             if not premises:
                 constant += absolute
             elif len(premises) == 1:
@@ -155,7 +164,7 @@ def design_inertia(data: ArmInertiaData) -> DesignInertia:
     return DesignInertia(constant, slopes, rest)
 
 
-def _monomials(data: ArmInertiaData, block: InertiaBlock) -> dict[tuple[int, ...], fmpq_mat]:
+def _monomials(data: InertiaData, block: InertiaBlock) -> dict[tuple[int, ...], fmpq_mat]:
     """Coefficients of the multilinear interpolant of one block's vertices, by the premises each one multiplies."""
     terms: dict[tuple[int, ...], list[fmpq_mat]] = {(): [matrix(vertex) for vertex in block.vertices]}
     for p in block.premises:

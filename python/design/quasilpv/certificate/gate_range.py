@@ -1,7 +1,7 @@
 """The needed range: which ``M_t / M_n`` occur over operating domain and payload set, proved by branch and bound.
 
 ``c1 M_n < M_t < c2 M_n`` for every posture and every payload fraction bounds all eigenvalues of ``M_n^-1 M_t``, and
-implies, one subtracted from the other, that M_n is positive definite wherever the arm can be. Both are pencils of
+implies, one subtracted from the other, that M_n is positive definite wherever the robot can be. Both are pencils of
 `gate_cells`: a cell that the guide does not accept is cut in two, a cell that it accepts is put to the exact test.
 
 Postures, not premises: cosines of angles that add up are dependent, and at the corners of the premise box there is no
@@ -27,7 +27,7 @@ from quasilpv.certificate.gate_cells import (
     cosine_enclosure,
     smallest_eigenvalues,
 )
-from quasilpv.certificate.gate_inertia import ArmInertiaData, Pair, design_inertia, true_inertia
+from quasilpv.certificate.gate_inertia import InertiaData, Pair, design_inertia, true_inertia
 from quasilpv.certificate.gate_rationals import float_at_least, float_at_most, to_float, to_floats
 from quasilpv.errors import InputError
 
@@ -46,7 +46,7 @@ BOX_BITS = 100
 
 @dataclass(frozen=True)
 class Place:
-    """Where an inertia ratio occurs: joint angles (theta_1 does not matter) and payload fraction."""
+    """Where an inertia ratio occurs: joint angles and payload fraction."""
 
     angle_rad: tuple[float, ...]
     payload_fraction: float
@@ -77,13 +77,13 @@ class NeededRange:
 
 
 class InertiaPair:
-    """The true and the design inertia of one arm: exact pencils, and sampled ratios.
+    """The true and the design inertia of one robot: exact pencils, and sampled ratios.
 
     Raises:
         InputError: on the operating domain a premise leaves the box the run-time clamps it to.
     """
 
-    def __init__(self, data: ArmInertiaData) -> None:
+    def __init__(self, data: InertiaData) -> None:
         """Build both inertias from the shipped data."""
         _require_premises_inside_box(data)
         self.data = data
@@ -96,9 +96,8 @@ class InertiaPair:
         self._slope_floats = {pair: to_floats(slope) for pair, slope in self._design.slopes.items()}
 
     def domain(self) -> Cells:
-        """All postures (theta_2 ... theta_n) and payload fractions as one cell."""
-        lower = [rational(low) for low, _ in self.data.angle_rad[1:]]
-        upper = [rational(high) for _, high in self.data.angle_rad[1:]]
+        """All postures (differences of neighbouring absolute angles) and payload fractions as one cell."""
+        lower, upper = ([interval[side] for interval in self.data.relative_rad] for side in (0, 1))
         return Cells.whole([*lower, fmpq(0)], [*upper, fmpq(1)])
 
     def pencil(self, side: Side, bound: fmpq) -> Pencil:
@@ -117,12 +116,13 @@ class InertiaPair:
         return Pencil.enclosing(K, rest.reshape(n, n))
 
     def ratios(self, points: FloatArray) -> FloatArray:
-        """Eigenvalues of ``M_n^-1 M_t`` in doubles, ascending, (N, n), at points (theta_2 ... theta_n, f), (N, n).
+        """Eigenvalues of ``M_n^-1 M_t`` in doubles, ascending, (N, n), at points (posture, f), (N, n).
 
         Raises:
             numpy.linalg.LinAlgError: M_n is not positive definite at one of the points.
         """
-        cosines = _cosines(np.column_stack([np.zeros(len(points)), points[:, :-1]]))
+        relative = np.column_stack([np.zeros(len(points)), points[:, :-1]])
+        cosines = _cosines(np.cumsum(relative, axis=1))
         powers = points[:, -1, None] ** np.arange(DEGREE + 1)
         true = np.einsum("ijp,np->nij", self._true_floats, powers) * cosines
         factor = np.linalg.cholesky(self._absolute_design_inertia(cosines))
@@ -132,11 +132,16 @@ class InertiaPair:
     def true_inertia_at(self, angles: FloatArray, payload_fraction: float) -> FloatArray:
         """M_t in doubles and joint coordinates, (N, n, n), at configurations (N, n) with one payload."""
         D = self._true_floats @ payload_fraction ** np.arange(DEGREE + 1)
-        return _in_joint_angles(D * _cosines(angles))
+        return self._in_joint_angles(D * _cosines(self.data.absolute(angles)))
 
     def design_inertia_at(self, angles: FloatArray) -> FloatArray:
         """M_n in doubles and joint coordinates, (N, n, n), at configurations (N, n)."""
-        return _in_joint_angles(self._absolute_design_inertia(_cosines(angles)))
+        return self._in_joint_angles(self._absolute_design_inertia(_cosines(self.data.absolute(angles))))
+
+    def _in_joint_angles(self, absolute: FloatArray) -> FloatArray:
+        """``S' X S`` of (N, n, n)."""
+        S = to_floats(self.data.mechanism.absolute_map)
+        return np.asarray(S.T @ absolute @ S)
 
     def _absolute_design_inertia(self, cosines: FloatArray) -> FloatArray:
         """M_n in absolute angles, (N, n, n)."""
@@ -146,8 +151,8 @@ class InertiaPair:
         return design
 
     def samples(self) -> FloatArray:
-        """About `SAMPLES` points (theta_2 ... theta_n, f) of the domain, its bounds included."""
-        intervals = self.data.angle_rad[1:]
+        """About `SAMPLES` points (posture, f) of the domain, its bounds included."""
+        intervals = [(to_float(low), to_float(high)) for low, high in self.data.relative_rad]
         per_joint = max(3, round((SAMPLES / SAMPLED_FRACTIONS) ** (1 / max(1, len(intervals)))))
         axes = [np.linspace(low, high, per_joint) for low, high in intervals]
         axes.append(np.linspace(0.0, 1.0, SAMPLED_FRACTIONS))
@@ -161,9 +166,8 @@ class InertiaPair:
         return self.place(points[row], float(ratios[row, column]))
 
     def place(self, point: FloatArray, ratio: float) -> Place:
-        """A point (theta_2 ... theta_n, f) with theta_1 at the middle of its interval."""
-        first = sum(self.data.angle_rad[0]) / 2
-        return Place((first, *map(float, point[:-1])), float(point[-1]), ratio)
+        """A point (posture, f) as joint angles."""
+        return Place(self.data.configuration(point[:-1]), float(point[-1]), ratio)
 
 
 def needed_range(inertia: InertiaPair, tolerance: float = TOLERANCE) -> NeededRange | None:
@@ -255,34 +259,27 @@ class _Side:
         return int(self._sign) * fmpq(int(np.ceil(wide * 2**BOUND_BITS)), 1 << BOUND_BITS)
 
 
-def premise_ranges(data: ArmInertiaData) -> tuple[tuple[fmpq, fmpq], ...]:
+def premise_ranges(data: InertiaData) -> tuple[tuple[fmpq, fmpq], ...]:
     """Proved bounds of every premise over the operating domain, tight to `BOX_BITS` bits."""
     return tuple(cosine_range(data, pair) for pair in data.premise_pairs)
 
 
-def cosine_range(data: ArmInertiaData, pair: Pair) -> tuple[fmpq, fmpq]:
-    """Proved bounds of ``cos(theta_{i+1} + ... + theta_j)`` over the operating domain, tight to `BOX_BITS` bits."""
+def cosine_range(data: InertiaData, pair: Pair) -> tuple[fmpq, fmpq]:
+    """Proved bounds of ``cos(alpha_j - alpha_i)`` over the operating domain, tight to `BOX_BITS` bits."""
     i, j = pair
-    low, high = (sum((rational(x[side]) for x in data.angle_rad[i + 1 : j + 1]), fmpq(0)) for side in (0, 1))
+    low, high = (sum((x[side] for x in data.relative_rad[i:j]), fmpq(0)) for side in (0, 1))
     below, above = cosine_enclosure(low, high, BOX_BITS)
     unit = 1 << BOX_BITS
     return fmpq(below, unit), fmpq(above, unit)
 
 
-def _require_premises_inside_box(data: ArmInertiaData) -> None:
+def _require_premises_inside_box(data: InertiaData) -> None:
     for p, (below, above) in enumerate(premise_ranges(data)):
         lower, upper = data.premise_lower[p], data.premise_upper[p]
         if below < rational(lower) or above > rational(upper):
             raise InputError("law", f"inertia: box of premise {p}", f"[{lower}, {upper}]", "its range on the domain")
 
 
-def _cosines(angles: FloatArray) -> FloatArray:
-    """``cos(alpha_k - alpha_l)`` at configurations (N, n), (N, n, n)."""
-    absolute = np.cumsum(angles, axis=1)
+def _cosines(absolute: FloatArray) -> FloatArray:
+    """``cos(alpha_k - alpha_l)`` at absolute angles (N, n), (N, n, n)."""
     return np.asarray(np.cos(absolute[:, :, None] - absolute[:, None, :]))
-
-
-def _in_joint_angles(absolute: FloatArray) -> FloatArray:
-    """``S' X S`` with S the lower triangle of ones."""
-    S = np.tri(absolute.shape[-1])
-    return np.asarray(S.T @ absolute @ S)

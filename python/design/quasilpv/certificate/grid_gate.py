@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from flint import fmpq
 
-from quasilpv.certificate.gate_data import HALF_A_SAMPLE, arm_inertia_data, law_kind
-from quasilpv.certificate.gate_inertia import ArmInertiaData
+from quasilpv.certificate.gate_data import HALF_A_SAMPLE, inertia_data, law_kind
+from quasilpv.certificate.gate_inertia import InertiaData
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_range
 from quasilpv.certificate.gate_rationals import to_float
 from quasilpv.certificate.vertex_tables import VertexTable
@@ -99,13 +99,13 @@ def grid_gate(document: Mapping[str, Any], source: str = "artifact", delay_sampl
         delay_samples: the transport delay it has to tolerate, in samples.
 
     Raises:
-        InputError: a law this gate does not know, another robot than a planar serial arm, a premise that leaves its box
+        InputError: a law or a robot this gate does not know, a premise that leaves its box
             on the operating domain, or data that contradict each other.
     """
     build = FROZEN_LAWS[law_kind(document, source, FROZEN_LAWS)]
-    data = arm_inertia_data(document, source)
+    data = inertia_data(document, source)
     pair = InertiaPair(data)
-    angles = configurations(data.angle_rad)
+    angles = configurations(data.angle_rad, every_joint=not data.turns_as_one)
     plants = LoopGrid(build(document, angles), angles, {f: pair.true_inertia_at(angles, f) for f in PAYLOAD_FRACTIONS})
     delay_s = to_float(delay_samples) * plants.law.sample_period_s
     return GridGate(
@@ -148,7 +148,7 @@ def frozen_torque_law(document: Mapping[str, Any], angles: FloatArray) -> Torque
     """The law `dob-torque` of an artifact at B configurations, (B, n), its premises clamped to their box."""
     law = document["law"]
     tables = {name: VertexTable.parse(law[name]) for name in ("inertia", "feedback", "observer")}
-    cosines = _premises_at(arm_inertia_data(document), angles)
+    cosines = _premises_at(inertia_data(document), angles)
     return TorqueLaw(
         sample_period_s=float(document["sample_period_s"]),
         filter_time_constant_s=float(law["filter_time_constant_s"]),
@@ -156,9 +156,9 @@ def frozen_torque_law(document: Mapping[str, Any], angles: FloatArray) -> Torque
     )
 
 
-def _premises_at(data: ArmInertiaData, angles: FloatArray) -> FloatArray:
+def _premises_at(data: InertiaData, angles: FloatArray) -> FloatArray:
     """The cosines the premises are, (B, p)."""
-    absolute = np.cumsum(angles, axis=1)
+    absolute = data.absolute(angles)
     columns = [np.cos(absolute[:, upper] - absolute[:, lower]) for lower, upper in data.premise_pairs]
     return np.array(columns).reshape(len(columns), len(angles)).T
 
@@ -166,7 +166,7 @@ def _premises_at(data: ArmInertiaData, angles: FloatArray) -> FloatArray:
 def frozen_hinf_law(document: Mapping[str, Any], angles: FloatArray) -> VelocityLaw:
     """The law `hinf-tracking` of an artifact at B configurations, (B, n), its premises clamped to their box."""
     law = document["law"]
-    cosines = _premises_at(arm_inertia_data(document), angles)
+    cosines = _premises_at(inertia_data(document), angles)
     numerator, inertia = (VertexTable.parse(law[name]).evaluate(cosines) for name in ("numerator", "inertia"))
     return hinf_tracking_law(
         float(document["sample_period_s"]),

@@ -33,8 +33,8 @@ from typing import Any
 from flint import fmpq, fmpq_mat
 
 from quasilpv.certificate.claims import Claim
-from quasilpv.certificate.exact_matrices import identity, matrix, rational, stack, symmetric, zero
-from quasilpv.certificate.gate_data import arm_inertia_data
+from quasilpv.certificate.exact_matrices import identity, magnitude, matrix, rational, stack, symmetric, zero
+from quasilpv.certificate.gate_data import inertia_data
 from quasilpv.certificate.gate_inertia import true_inertia
 from quasilpv.certificate.vertex_tables import VertexTable
 
@@ -52,7 +52,7 @@ def check_hinf_tracking(document: Mapping[str, Any]) -> tuple[Claim, ...]:
     """Claims of a `hinf-tracking` artifact, given as its document.
 
     Raises:
-        InputError: another robot than a planar serial arm.
+        InputError: a robot the gates do not know.
         KeyError, TypeError, ValueError: the tables or the witness are not of the documented form, or the tables do not
             share one schedule.
     """
@@ -126,29 +126,28 @@ def _limit_claims(numerator: Sequence[fmpq_mat], P: fmpq_mat, witness: Mapping[s
 def unknown_terms(document: Mapping[str, Any]) -> tuple[UnknownTerm, ...]:
     """Coriolis, gravity and friction torque of an artifact's robot as terms of rank one with exact bounds.
 
-    In absolute angles and speeds (`gate_inertia`; s_k the k-th row of S) they are, with |sin| and |sinc| at most 1,
+    In absolute angles and speeds (s_k the k-th row of S) they are, with |sin| and |sinc| at most 1,
 
         D_kl sin(alpha_k - alpha_l) W_l  s_k s_l' w (k != l),   g_k sinc(alpha_k) s_k s_k' theta,   f_k e_k e_k' w
 
-    with ``g_k = g (m_k r_k + L_k sum_{l>k} m_l)``. D and g grow with masses and centres of mass: they are taken at the
+    with ``g_k = g h_k`` (`gate_mechanism`). D and g grow with masses and centres of mass: they are taken at the
     larger of nominal value and full payload. The order is that of the lines above, (k, l) row by row.
     """
-    data = arm_inertia_data(document)
+    data = inertia_data(document)
     heavy = replace(
         data,
         mass_scale=tuple(max(1.0, scale) for scale in data.mass_scale),
         com_scale=tuple(max(1.0, scale) for scale in data.com_scale),
     )
-    n = data.joints
-    D = true_inertia(heavy)
-    speed = [max(abs(rational(bound)) for bound in interval) for interval in document["domain"]["speed_rad_s"]]
-    mass = [rational(link.mass_kg) * rational(s) for link, s in zip(data.links, heavy.mass_scale, strict=True)]
-    com = [rational(link.com_m) * rational(s) for link, s in zip(data.links, heavy.com_scale, strict=True)]
+    n, S = data.joints, data.mechanism.absolute_map
+    D, moments = true_inertia(heavy), data.mechanism.first_moments(heavy.mass_scale, heavy.com_scale)
+    largest = matrix(
+        [[max(abs(rational(bound)) for bound in interval)] for interval in document["domain"]["speed_rad_s"]]
+    )
+    speed = (magnitude(S) * largest).entries()
     g = rational(document["robot"]["parameters"]["gravity_m_s2"])
     friction = rational(document["witness"]["feedback"]["friction_nm_s"])
-
-    def chain(k: int) -> fmpq_mat:
-        return matrix([[int(j <= k)] for j in range(n)])
+    rows = [matrix([[factor] for factor in row]) for row in S.table()]
 
     def angle(column: fmpq_mat) -> fmpq_mat:
         return stack([[column], [zero(2 * n, 1)]])
@@ -157,13 +156,11 @@ def unknown_terms(document: Mapping[str, Any]) -> tuple[UnknownTerm, ...]:
         return stack([[zero(n, 1)], [column], [zero(n, 1)]])
 
     terms = [
-        UnknownTerm(chain(k), rate(chain(j)), abs(D[k][j](fmpq(1))) * sum(speed[: j + 1], fmpq(0)))
+        UnknownTerm(rows[k], rate(rows[j]), abs(D[k][j](fmpq(1))) * speed[j])
         for k, j in product(range(n), repeat=2)
         if k != j
     ]
-    for k, link in enumerate(data.links):
-        first_moment = mass[k] * com[k] + rational(link.length_m) * sum(mass[k + 1 :], fmpq(0))
-        terms.append(UnknownTerm(chain(k), angle(chain(k)), g * first_moment))
+    terms += [UnknownTerm(rows[k], angle(rows[k]), g * moments[k](fmpq(1))) for k in range(n)]
     for k in range(n):
         unit = matrix([[int(j == k)] for j in range(n)])
         terms.append(UnknownTerm(unit, rate(unit), friction))

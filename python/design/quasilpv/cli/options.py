@@ -14,6 +14,7 @@ from quasilpv.experiments.result import Variant
 from quasilpv.scenarios import ENCODER_BITS, Sensors
 from quasilpv.synthesis import CONTROLLERS, Specification, controller_kind
 from quasilpv.synthesis.acceleration_design import Progress
+from quasilpv.systems.registry import robot
 
 SHORT_NAMES = {"acceleration": "dob-acceleration", "torque": "dob-torque"}
 
@@ -87,18 +88,20 @@ def require_controller(controller: str) -> str:
 
 
 def specification(
+    robot_id: str,
     controller: str,
     rate_hz: float | None,
     encoder_bits: int | None,
+    *,
     margin_spare: float | None = None,
     torque_activity: float | None = None,
 ) -> Specification:
     """The specification for these numbers; what is not given, and exact angles (0 bits), keep their default.
 
-    The default rate is the controller's own.
+    The default rate is the controller's own, the frequency of disturbances the robot's.
 
     Raises:
-        InputError: out of range.
+        InputError: an unknown robot, or a number out of range.
     """
     defaults = Specification()
     return Specification(
@@ -106,6 +109,7 @@ def specification(
         encoder_bits=encoder_bits or defaults.encoder_bits,
         margin_spare=defaults.margin_spare if margin_spare is None else margin_spare,
         torque_activity=defaults.torque_activity if torque_activity is None else torque_activity,
+        disturbance_frequency_rad_s=robot(robot_id).disturbance_frequency_rad_s,
     )
 
 
@@ -114,7 +118,7 @@ def designed(robot_id: str, variant: Variant, rate_hz: float | None, progress: P
     return kept_design(
         robot_id,
         variant.controller,
-        specification(variant.controller, rate_hz, variant.encoder_bits),
+        specification(robot_id, variant.controller, rate_hz, variant.encoder_bits),
         disturbance_compensation=variant.compensated,
         progress=progress,
     )

@@ -56,7 +56,9 @@ def synth_command(
     """
     robot(robot_id)
     design = require_controller(controller)
-    wanted = specification(design, rate_hz, encoder_bits, margin_spare, torque_activity)
+    wanted = specification(
+        robot_id, design, rate_hz, encoder_bits, margin_spare=margin_spare, torque_activity=torque_activity
+    )
     with progress(1) as steps:
         steps.begin(f"{design} for {robot_id}")
         made = release(robot_id, design, wanted, allow_unverified=allow_unverified, progress=steps.parts)

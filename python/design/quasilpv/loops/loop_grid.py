@@ -21,13 +21,17 @@ LARGEST_DELAY_SAMPLES = 8.0
 BISECTIONS = 7
 
 
-def configurations(angle_rad: Sequence[Sequence[float]], count: int = CONFIGURATIONS) -> FloatArray:
+def configurations(
+    angle_rad: Sequence[Sequence[float]], count: int = CONFIGURATIONS, *, every_joint: bool = False
+) -> FloatArray:
     """Grid of about ``count`` configurations of a box of joint angles, bounds included, shape (N, n).
 
-    The inertia of a serial chain does not depend on its first joint, which stays at the middle of its interval.
+    The inertia of a serial chain does not depend on its first joint, which stays at the middle of its interval unless
+    ``every_joint`` is set, for laws with gravity in their loop and for other mechanisms.
     """
-    per_joint = max(3, round(count ** (1.0 / max(1, len(angle_rad) - 1))))
-    first = np.array([sum(angle_rad[0]) / 2.0])
+    per_joint = max(3, round(count ** (1.0 / max(1, len(angle_rad) - (0 if every_joint else 1)))))
+    low, high = angle_rad[0]
+    first = np.linspace(low, high, per_joint) if every_joint else np.array([(low + high) / 2.0])
     axes = [first, *(np.linspace(low, high, per_joint) for low, high in angle_rad[1:])]
     return np.array(list(itertools.product(*axes)))
 

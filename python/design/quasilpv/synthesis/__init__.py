@@ -90,7 +90,8 @@ def synthesise(
     Args:
         robot: from the registry of robots.
         controller: one of `CONTROLLERS`.
-        specification: what is asked for (default: that of `Specification`, at the controller's own rate); baselines use
+        specification: what is asked for (default: that of `Specification`, at the controller's own rate and
+            the robot's own frequency of disturbances); baselines use
             its sample rate only.
         disturbance_compensation: False leaves the observed disturbance out of the torque of `dob-acceleration`, to show
             what it is worth.
@@ -101,7 +102,8 @@ def synthesise(
         InfeasibleError: no design meets the specification.
     """
     kind = controller_kind(controller)
-    design = kind.design(robot, specification or Specification(rate_hz=kind.rate_hz), progress)
+    default = Specification(rate_hz=kind.rate_hz, disturbance_frequency_rad_s=robot.disturbance_frequency_rad_s)
+    design = kind.design(robot, specification or default, progress)
     if disturbance_compensation:
         return design
     if "disturbance_compensation" not in design.law:

@@ -1,8 +1,10 @@
 """The controllers the default design is compared with, with the gains of the thesis.
 
-All place a triple pole at ``w = 15 pi`` rad/s: PID with feedforward through the largest diagonal inertia of each joint
-(Dehak 2022, III.54-III.55), computed torque through the inertia matrix (III.56-III.57), without and with a disturbance
-observer (Mohammadi et al. 2013). They read measured speeds, noisy and filtered.
+All place a triple pole at a bandwidth w of the robot, 15 pi rad/s for the serial arms and 80 pi for the five-bar robot:
+PID with feedforward through the largest inertia that each joint drives (Dehak 2022, III.54-III.55), computed torque
+through the inertia matrix (III.56-III.57), without and with a disturbance observer (Mohammadi et al. 2013). They read
+measured speeds, noisy and filtered. For the five-bar robot computed torque on the reduced model is the law (IV.78),
+whose passive angles and speeds the rhombus gives in closed form; the printed k_d and g_d carry a factor 1e4 too much.
 """
 
 from __future__ import annotations
@@ -20,11 +22,10 @@ from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.registry import Robot
 
-BANDWIDTH_RAD_S = 15.0 * math.pi
-"""Triple pole of all three baselines: reproduces every printed digit of III.55 and III.57."""
-
-VELOCITY_FILTER_TIME_CONSTANT_S = 2e-3
-"""First-order filter of the measured speed; the thesis names the filter, not its time constant."""
+ARM_BANDWIDTH_RAD_S = 15.0 * math.pi
+ARM_VELOCITY_FILTER_S = 2e-3
+"""First-order filter of the measured speed at that bandwidth, faster in proportion for faster robots; the thesis names
+the filter, not its time constant."""
 
 DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S = 250.0
 """The thesis gives no gain for the observer. With the full payload the loop of integral action and observer is only
@@ -38,19 +39,26 @@ class Tuning:
 
     Attributes:
         bandwidth_rad_s: w of the poles.
+        velocity_filter_time_constant_s: of the measured speed; 0 for no filter.
         integral_ratio: slowest pole over the others; 1 for a triple pole.
-        velocity_filter_time_constant_s: of the measured speed.
         observer_bandwidth_rad_s: of the disturbance observer; 0 for none.
         inertia_scale: s, the design inertia over the nominal one. The feedforward of PID stays nominal.
         payload_fraction: of PID, whose gains per joint are in the ratios of the inertia with this payload.
     """
 
-    bandwidth_rad_s: float = BANDWIDTH_RAD_S
+    bandwidth_rad_s: float
+    velocity_filter_time_constant_s: float = 0.0
     integral_ratio: float = 1.0
-    velocity_filter_time_constant_s: float = VELOCITY_FILTER_TIME_CONSTANT_S
     observer_bandwidth_rad_s: float = 0.0
     inertia_scale: float = 1.0
     payload_fraction: float = 0.0
+
+    @classmethod
+    def printed(cls, robot: Robot, observer_bandwidth_rad_s: float = 0.0) -> Tuning:
+        """The printed gains of a robot."""
+        bandwidth = robot.printed_bandwidth_rad_s
+        filter_time = ARM_VELOCITY_FILTER_S * (ARM_BANDWIDTH_RAD_S / bandwidth)
+        return cls(bandwidth, filter_time, observer_bandwidth_rad_s=observer_bandwidth_rad_s)
 
     def unit_gains(self) -> tuple[float, float, float]:
         """Gains (kp, kd, ki) per unit inertia: ``s^3 + kd s^2 + kp s + ki = (s + w)^2 (s + rho w)``."""
@@ -59,32 +67,32 @@ class Tuning:
 
 
 def stretched_inertia(robot: Robot, payload_fraction: float) -> npt.NDArray[np.float64]:
-    """Largest diagonal entries of the inertia with a payload, (n,): of a serial arm, where all cosines are 1.
+    """Largest inertias driven by the joints with a payload, (n,): of a serial arm, those of the stretched one.
 
-    They are scaled so that their sum is that of the nominal arm: the payload changes their ratios only.
+    They are scaled so that their sum is that of the nominal robot: the payload changes their ratios only.
     """
-    nominal = np.diag(robot.model.inertia(np.zeros(robot.model.joints)))
+    nominal = robot.model.driven_inertia
     if payload_fraction == 0.0:
         return nominal
-    loaded = np.diag(robot.with_payload_fraction(payload_fraction).inertia(np.zeros(robot.model.joints)))
+    loaded = robot.with_payload_fraction(payload_fraction).driven_inertia
     return np.asarray(loaded * (nominal.sum() / loaded.sum()))
 
 
 def pid(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
     """PID with feedforward, gains of the thesis."""
-    return pid_design(robot, specification, Tuning())
+    return pid_design(robot, specification, Tuning.printed(robot))
 
 
 def computed_torque(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
     """Computed torque without disturbance observer, gains of the thesis."""
-    return computed_torque_design(robot, specification, Tuning())
+    return computed_torque_design(robot, specification, Tuning.printed(robot))
 
 
 def computed_torque_with_observer(
     robot: Robot, specification: Specification, progress: Progress = no_progress
 ) -> TrackingDesign:
     """Computed torque with a disturbance observer of `DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S`."""
-    tuning = Tuning(observer_bandwidth_rad_s=DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S)
+    tuning = Tuning.printed(robot, DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S)
     return computed_torque_design(robot, specification, tuning)
 
 

@@ -53,8 +53,8 @@ FILTER_TIMES = (1.5, 2.0)
 def unknown_torques(robot: Robot) -> UnknownTorques:
     """Bounds on Coriolis torque, gravity and friction over the operating domain and the payload set.
 
-    With absolute angles ``alpha = S theta`` and speeds ``W = S omega`` (S the lower triangle of ones, s_k its rows) the
-    torques are ``sum_k!=l D_kl sin(alpha_k - alpha_l) W_l s_k s_l' w``, ``sum_k g_k sinc(alpha_k) s_k s_k' theta`` and
+    With absolute angles ``alpha = S theta`` and speeds ``W = S omega`` (s_k the rows of S) the torques are
+    ``sum_k!=l D_kl sin(alpha_k - alpha_l) W_l s_k s_l' w``, ``sum_k g_k sinc(alpha_k) s_k s_k' theta`` and
     ``sum_k f_k e_k e_k' w``: every term has rank one, and |sin| and |sinc| are at most 1. D and g grow with masses and
     centres of mass, so their largest values are those of the arm with the larger of each.
     """
@@ -63,8 +63,8 @@ def unknown_torques(robot: Robot) -> UnknownTorques:
         [max(1.0, scale) for scale in payload.mass_scale], [max(1.0, scale) for scale in payload.com_scale]
     )
     n = robot.model.joints
-    S, e, none = np.tril(np.ones((n, n))), np.eye(n), np.zeros(n)
-    speed = np.cumsum([max(map(abs, interval)) for interval in robot.domain.speed_rad_s])
+    S, e, none = heaviest.absolute_map, np.eye(n), np.zeros(n)
+    speed = S @ [max(map(abs, interval)) for interval in robot.domain.speed_rad_s]
     D = heaviest.inertia_constants
     coriolis = [(S[k], [none, S[j], none], abs(D[k, j]) * speed[j]) for k in range(n) for j in range(n) if k != j]
     gravity = [(S[k], [S[k], none, none], heaviest.gravity_constants[k]) for k in range(n)]

@@ -29,7 +29,7 @@ def needed_inertia_range(robot: Robot, count: int = CONFIGURATIONS) -> InertiaRa
     Reachable configurations, not corners of the premise box: the cosines are dependent, and at some corners the inertia
     is not even positive definite. A grid, so a numerical range: the proof is the business of the certificate.
     """
-    postures = configurations(robot.domain.angle_rad, count)
+    postures = configurations(robot.domain.angle_rad, count, every_joint=not robot.model.turns_as_one)
     factor = np.linalg.cholesky(np.array([robot.model.inertia(theta) for theta in postures]))
     found: list[tuple[float, float, int, int, float]] = []
     for fraction in np.linspace(0.0, 1.0, PAYLOAD_FRACTIONS):
@@ -48,6 +48,5 @@ def needed_inertia_range(robot: Robot, count: int = CONFIGURATIONS) -> InertiaRa
 
 def largest_inertia_norm(robot: Robot) -> float:
     """Largest Frobenius norm of the nominal inertia over the operating domain, kg m^2."""
-    return max(
-        float(np.linalg.norm(robot.model.inertia(theta))) for theta in configurations(robot.domain.angle_rad, 200)
-    )
+    postures = configurations(robot.domain.angle_rad, 200, every_joint=not robot.model.turns_as_one)
+    return max(float(np.linalg.norm(robot.model.inertia(theta))) for theta in postures)

@@ -34,7 +34,7 @@ class PlantGrid:
     @classmethod
     def over(cls, robot: Robot, count: int, fractions: tuple[float, ...]) -> PlantGrid:
         """The grid of about ``count`` configurations of the robot's operating domain."""
-        angles = configurations(robot.domain.angle_rad, count)
+        angles = configurations(robot.domain.angle_rad, count, every_joint=not robot.model.turns_as_one)
         plants = {fraction: robot.with_payload_fraction(fraction) for fraction in fractions}
         return cls(
             angles,

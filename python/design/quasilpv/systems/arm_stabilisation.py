@@ -15,7 +15,7 @@ from quasilpv.errors import InputError
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.systems.arms import PlanarSerialArm
 from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.registry import robot
+from quasilpv.systems.registry import arm2, arm3
 from quasilpv.systems.system_kind import Parameter, SystemKind
 
 _DOMAIN = {
@@ -33,7 +33,7 @@ def arm2_kind(name: str) -> SystemKind:
     ) -> DescriptorSystem:
         if upright not in (0.0, 1.0):
             raise InputError(name, "upright", upright, "0 (theta = 0 hangs) or 1 (it is upright)")
-        arm = _with_last_mass(name, "m2", robot("arm2").model, m2, (fv1, fv2))
+        arm = _with_last_mass(name, "m2", arm2(), m2, (fv1, fv2))
         arm = replace(arm, equilibrium="upright" if upright else "hanging")
         return _stabilisation(name, arm, theta_max, speed_max)
 
@@ -56,7 +56,7 @@ def arm3_kind(name: str) -> SystemKind:
     """The 3-DoF arm of Example I.4, known as `name`."""
 
     def build(*, m3: float, fv: float, theta_max: float, speed_max: float) -> DescriptorSystem:
-        arm = _with_last_mass(name, "m3", robot("arm3").model, m3, (fv, fv, fv))
+        arm = _with_last_mass(name, "m3", arm3(), m3, (fv, fv, fv))
         return _stabilisation(name, arm, theta_max, speed_max)
 
     return SystemKind(
@@ -76,7 +76,7 @@ def frictionless_arm3_kind(name: str) -> SystemKind:
     """The 3-DoF arm without friction of Example II.8, known as `name`."""
 
     def build(*, m3: float, theta_max: float, speed_max: float) -> DescriptorSystem:
-        arm = _with_last_mass(name, "m3", robot("arm3").model, m3, (0.0, 0.0, 0.0))
+        arm = _with_last_mass(name, "m3", arm3(), m3, (0.0, 0.0, 0.0))
         return _stabilisation(name, arm, theta_max, speed_max)
 
     return SystemKind(

@@ -17,25 +17,18 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from quasilpv.errors import InputError
-from quasilpv.systems.arm_parameters import Link, OperatingDomain
-from quasilpv.systems.arm_symbols import SymbolicArm
-from quasilpv.systems.premise import AffineMatrix, Premise
-
-if TYPE_CHECKING:
-    from quasilpv.systems.descriptor import DescriptorSystem
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from quasilpv.systems.arm_parameters import Link
+from quasilpv.systems.mechanism import Matrix, PlanarMechanism, Vector
 
 
 @dataclass(frozen=True)
-class PlanarSerialArm:
+class PlanarSerialArm(PlanarMechanism):
     """A chain of n rigid links in a vertical plane: ``M(theta) theta'' + N(theta, omega) omega + G(theta) = Gamma``.
 
     Frames: X to the right, Y up, gravity along -Y; angles are positive counter-clockwise.
@@ -86,6 +79,11 @@ class PlanarSerialArm:
         return 1.0 if self.equilibrium == "hanging" else -1.0
 
     @cached_property
+    def absolute_map(self) -> Matrix:
+        """The lower triangle of ones: ``alpha_k = theta_1 + ... + theta_k``."""
+        return np.tri(self.joints)
+
+    @cached_property
     def length_m(self) -> Vector:
         """The n link lengths L."""
         return np.array([link.length_m for link in self.links])
@@ -109,6 +107,11 @@ class PlanarSerialArm:
         return D
 
     @property
+    def driven_inertia(self) -> Vector:
+        """Largest diagonal entries of M, those of the stretched arm."""
+        return np.diag(self.inertia(np.zeros(self.joints)))
+
+    @property
     def printed_coriolis_shift(self) -> float:
         """Sign of what separates the printed N from the skew one, 0 for other factorisations.
 
@@ -130,59 +133,15 @@ class PlanarSerialArm:
 
     # ---- dynamics --------------------------------------------------------------------------------------------------
 
-    def absolute(self, theta: ArrayLike) -> Vector:
-        """Absolute angles ``alpha_k = theta_1 + ... + theta_k`` (or speeds) of n joint angles (or speeds)."""
-        values = np.asarray(theta, dtype=float)
-        if values.shape != (self.joints,):
-            raise InputError(self.name, "joint vector", f"shape {values.shape}", f"shape ({self.joints},)")
-        return np.cumsum(values)
-
-    def inertia(self, theta: ArrayLike) -> Matrix:
-        """Inertia matrix M(theta), n x n symmetric positive definite, kg m^2."""
-        alpha = self.absolute(theta)
-        return _relative(self.inertia_constants * np.cos(alpha[:, None] - alpha[None, :]))
-
     def coriolis_matrix(self, theta: ArrayLike, omega: ArrayLike) -> Matrix:
-        """Matrix N(theta, omega), n x n, friction included: N omega is the torque due to speeds.
-
-        In absolute angles ``N_kl = D_kl sin(alpha_k - alpha_l) W_l``; ``coriolis_factorisation`` says which N.
-        """
-        alpha, W = self.absolute(theta), self.absolute(omega)
-        D = self.inertia_constants
-        N = _relative(D * np.sin(alpha[:, None] - alpha[None, :]) * W[None, :])
+        """Matrix N(theta, omega), n x n, friction included; ``coriolis_factorisation`` says which."""
+        N = super().coriolis_matrix(theta, omega)
         if self.printed_coriolis_shift:
-            shift = self.printed_coriolis_shift * D[0, 1] * np.sin(alpha[1] - alpha[0])
+            alpha, W = self.absolute(theta), self.absolute(omega)
+            shift = self.printed_coriolis_shift * self.inertia_constants[0, 1] * np.sin(alpha[1] - alpha[0])
             N[0, 0] += shift * (W[1] - W[0])
             N[0, 1] -= shift * W[0]
-        return N + np.diag(self.friction_nm_s)
-
-    def coriolis(self, theta: ArrayLike, omega: ArrayLike, along: ArrayLike | None = None) -> Vector:
-        """Torque N(theta, omega) v, n, N m, with v = ``along`` (default omega): Coriolis, centrifugal and friction."""
-        v = np.asarray(omega if along is None else along, dtype=float)
-        torque: Vector = self.coriolis_matrix(theta, omega) @ v
-        return torque
-
-    def gravity(self, theta: ArrayLike) -> Vector:
-        """Gravity torque G(theta), n, N m: ``G_i = +-sum_{k>=i} g_k sin(alpha_k)``, + when theta = 0 hangs."""
-        terms = self.equilibrium_sign * self.gravity_constants * np.sin(self.absolute(theta))
-        return np.cumsum(terms[::-1])[::-1].copy()
-
-    def inverse_dynamics(self, theta: ArrayLike, omega: ArrayLike, acceleration: ArrayLike) -> Vector:
-        """Torque Gamma = M theta'' + N omega + G, n, N m."""
-        acceleration = np.asarray(acceleration, dtype=float)
-        torque: Vector = self.inertia(theta) @ acceleration + self.coriolis(theta, omega) + self.gravity(theta)
-        return torque
-
-    def forward_dynamics(self, theta: ArrayLike, omega: ArrayLike, torque: ArrayLike) -> Vector:
-        """Acceleration theta'' = M^-1 (Gamma - N omega - G), n, rad/s^2."""
-        load = np.asarray(torque, dtype=float) - self.coriolis(theta, omega) - self.gravity(theta)
-        return np.asarray(np.linalg.solve(self.inertia(theta), load), dtype=float)
-
-    def energy(self, theta: ArrayLike, omega: ArrayLike) -> float:
-        """Kinetic plus potential energy, J; the potential is 0 with every link horizontal."""
-        omega = np.asarray(omega, dtype=float)
-        kinetic = 0.5 * omega @ self.inertia(theta) @ omega
-        return float(kinetic - self.equilibrium_sign * self.gravity_constants @ np.cos(self.absolute(theta)))
+        return N
 
     # ---- kinematics ------------------------------------------------------------------------------------------------
 
@@ -238,42 +197,9 @@ class PlanarSerialArm:
         theta1 = np.arctan2(wrist_x, -wrist_y) - np.arctan2(L2 * np.sin(theta2), L1 + L2 * np.cos(theta2))
         return np.array([theta1, theta2, Phi - theta1 - theta2])
 
-    # ---- symbolic model and premises -------------------------------------------------------------------------------
-
-    @cached_property
-    def symbolic(self) -> SymbolicArm:
-        """The same model as sympy expressions of theta_i and omega_i."""
-        return SymbolicArm.of(self)
-
-    def inertia_premises(self, domain: OperatingDomain) -> tuple[Premise, ...]:
-        """The measured premises ``cos(theta_{k+1} + ... + theta_l)`` the inertia is affine in, with guaranteed bounds.
-
-        Order: neighbouring links first, then further apart, base to tool; for n = 3: cos theta_2, cos theta_3,
-        cos(theta_2 + theta_3).
-        """
-        return self.symbolic.inertia_premises(domain)
-
-    def inertia_affine(self) -> AffineMatrix:
-        """M as ``M_0 + sum_p z_p M_p`` in the premises of `inertia_premises`, kg m^2."""
-        n, D = self.joints, self.inertia_constants
-
-        def term(k: int, j: int) -> Matrix:
-            basis = np.zeros((n, n))
-            basis[k, j] = basis[j, k] = D[k, j]
-            return _relative(basis)
-
-        pairs = [(k, k + gap) for gap in range(1, n) for k in range(n - gap)]
-        coefficients = np.array([term(k, j) for k, j in pairs]).reshape(len(pairs), n, n)
-        return AffineMatrix(_relative(np.diag(np.diag(D))), coefficients)
-
-    def as_descriptor_system(self, domain: OperatingDomain) -> DescriptorSystem:
-        """The descriptor model E(z) x' = A(z) x + B u, y = theta, with x = (theta, omega), u = Gamma.
-
-        ``E = diag(I, M)``, ``A = [0, I; -H, -N]``, ``B = [0; I]``, ``C = [I, 0]``, where G(theta) = H(theta) theta. The
-        premises are those of Dehak 2022 (Example I.2 for n = 2, Table I.3 for n = 3) for the printed factorisation of
-        N; otherwise cos(alpha_l - alpha_k), sin(alpha_l - alpha_k) W_k and W_l, and sinc(alpha_k).
-        """
-        return self.symbolic.descriptor_system(self.name, domain)
+    def singularity(self, theta: ArrayLike) -> tuple[str, float]:
+        """|sin(theta_2)|: the 3-DoF arm is singular when its first two links are in line."""
+        return "|sin(theta_2)|", float(abs(np.sin(np.asarray(theta, dtype=float)[1])))
 
     # ---- perturbation ----------------------------------------------------------------------------------------------
 
@@ -308,8 +234,3 @@ class PlanarSerialArm:
         document = self.parameters_document()
         del document["equilibrium"]
         return {"kind": "serial-arm", "label": label, **document}
-
-
-def _relative(absolute: Matrix) -> Matrix:
-    """A form in absolute speeds written in relative ones, S^T X S: entry (i, j) sums X over rows >= i, columns >= j."""
-    return np.cumsum(np.cumsum(absolute[::-1, ::-1], axis=0), axis=1)[::-1, ::-1].copy()

@@ -1,8 +1,8 @@
-"""The references of the serial arm's tracking experiments.
+"""The references of the tracking experiments.
 
-Dehak (2022, III.3.3 and IV.5.1) says only that the tool follows a square and three quarters of a circle in the vertical
-plane within 3 s; places, sizes, time law and tool orientation are this project's choice. The orientation of 45 degrees
-lets errors of the last joint show in both X and Y.
+Dehak (2022, III.3.3, IV.5.1 and IV.5.2) says only that the tool of the serial arm follows a square and three quarters
+of a circle in the vertical plane within 3 s, and that of the five-bar robot a spiral; places, sizes, time law and tool
+orientation are this project's choice. The orientation of 45 degrees lets errors of the last joint show in both X and Y.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.trajectories.document import Trajectory
-from quasilpv.trajectories.paths import ArcSegment, LineSegment, Segment, TaskPath
+from quasilpv.trajectories.paths import ArcSegment, LineSegment, Segment, SpiralSegment, TaskPath
 from quasilpv.trajectories.planning import Kinematics, plan
 
 SQUARE = TaskPath(
@@ -33,6 +33,13 @@ CIRCLE = TaskPath(
 )
 """Three quarters of the circle of radius 0.2 m about (1.5, -1.55), from angle 0 counter-clockwise, in 3 s."""
 
+SPIRAL = TaskPath(
+    name="fivebar-spiral",
+    start=(0.0, -0.22),
+    segments=(Segment(spiral=SpiralSegment(radius=0.06, angle_rad=6.0 * math.pi, duration_s=5.0)),),
+)
+"""Three turns of a spiral from (0, -0.22) outwards to a radius of 0.06 m, in 5 s."""
+
 
 def serial_square(arm: Kinematics, domain: OperatingDomain | None = None) -> Trajectory:
     """Return the trajectory of the 3-DoF arm along ``SQUARE``.
@@ -50,3 +57,12 @@ def serial_circle(arm: Kinematics, domain: OperatingDomain | None = None) -> Tra
         InputError: as ``plan``.
     """
     return plan(arm, CIRCLE, domain)
+
+
+def fivebar_spiral(robot: Kinematics, domain: OperatingDomain | None = None) -> Trajectory:
+    """Return the trajectory of the five-bar robot along ``SPIRAL``.
+
+    Raises:
+        InputError: as ``plan``.
+    """
+    return plan(robot, SPIRAL, domain)

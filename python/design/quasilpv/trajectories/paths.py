@@ -1,8 +1,9 @@
 """Task-space paths: what the tool does in the plane of the arm, and when.
 
-A path is a start point and segments, straight lines and circular arcs. Each segment starts and ends at rest, with the
-septic time law ``q(s) = 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7`` (velocity, acceleration and jerk vanish at both ends); the
-tool keeps one orientation. Frame: the arm's base frame, X to the right, Y up, metres and radians.
+A path is a start point and segments: straight lines, circular arcs and spirals. Each segment starts and ends at rest,
+with the septic time law ``q(s) = 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7`` (velocity, acceleration and jerk vanish at both
+ends); a tool with an orientation of its own keeps it. Frame: the robot's base frame, X to the right, Y up, metres and
+radians.
 """
 
 from __future__ import annotations
@@ -59,41 +60,63 @@ class ArcSegment(StrictModel):
     duration_s: Duration
 
 
+class SpiralSegment(StrictModel):
+    """An Archimedean spiral from the current point, its centre, outwards to ``radius``; counter-clockwise if positive.
+
+    It starts in the direction of X and turns by ``angle_rad`` in all.
+    """
+
+    radius: Annotated[float, Field(gt=0)]
+    angle_rad: float
+    duration_s: Duration
+
+
 class Segment(StrictModel):
-    """One segment: exactly one of ``line`` and ``arc``."""
+    """One segment: exactly one of ``line``, ``arc`` and ``spiral``."""
 
     line: LineSegment | None = None
     arc: ArcSegment | None = None
+    spiral: SpiralSegment | None = None
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
-        if (self.line is None) == (self.arc is None):
-            raise FieldError("line", "both or neither of line and arc", "exactly one of line and arc")
+        given = [name for name in Segment.model_fields if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise FieldError("line", " and ".join(given) or "no kind of segment", "exactly one of line, arc, spiral")
         return self
 
     @property
     def duration_s(self) -> float:
         """Time the segment takes."""
-        return self.line.duration_s if self.line is not None else self._arc.duration_s
+        return self._given.duration_s
 
     @property
-    def _arc(self) -> ArcSegment:
-        assert self.arc is not None
-        return self.arc
+    def _given(self) -> LineSegment | ArcSegment | SpiralSegment:
+        given = self.line or self.arc or self.spiral
+        assert given is not None
+        return given
 
-    def curve(self, start: Point) -> Line | Arc:
+    def curve(self, start: Point) -> Line | Arc | Spiral:
         """Return the curve of the segment when it starts at ``start``."""
-        if self.line is not None:
-            return Line(start, self.line.to)
-        dx, dy = start[0] - self._arc.centre[0], start[1] - self._arc.centre[1]
-        return Arc(self._arc.centre, math.hypot(dx, dy), math.atan2(dy, dx), self._arc.angle_rad)
+        match self._given:
+            case LineSegment(to=end):
+                return Line(start, end)
+            case ArcSegment(centre=centre, angle_rad=angle):
+                dx, dy = start[0] - centre[0], start[1] - centre[1]
+                return Arc(centre, math.hypot(dx, dy), math.atan2(dy, dx), angle)
+            case SpiralSegment(radius=radius, angle_rad=angle):
+                return Spiral(start, radius, angle)
 
 
 class TaskPath(StrictModel):
-    """A named path of the tool with constant orientation ``tool_angle_rad`` (Phi, from the downward vertical)."""
+    """A named path of the tool.
+
+    ``tool_angle_rad`` is the constant orientation Phi from the downward vertical of a tool that has one of its own;
+    None for the others.
+    """
 
     name: Annotated[str, Field(min_length=1)]
-    tool_angle_rad: float
+    tool_angle_rad: float | None = None
     start: Point
     segments: Annotated[tuple[Segment, ...], Field(min_length=1)]
 
@@ -114,6 +137,11 @@ class TaskPath(StrictModel):
         """Time from start to end."""
         return self.segment_times_s[-1]
 
+    @property
+    def orientation(self) -> tuple[float, ...]:
+        """What follows the position in a pose: (Phi,) or nothing."""
+        return () if self.tool_angle_rad is None else (self.tool_angle_rad,)
+
     @cached_property
     def segment_times_s(self) -> tuple[float, ...]:
         """The times at which segments start, and the end of the last one."""
@@ -123,8 +151,8 @@ class TaskPath(StrictModel):
         return tuple(times)
 
     @cached_property
-    def _curves(self) -> tuple[Line | Arc, ...]:
-        curves: list[Line | Arc] = []
+    def _curves(self) -> tuple[Line | Arc | Spiral, ...]:
+        curves: list[Line | Arc | Spiral] = []
         point = self.start
         for segment in self.segments:
             curves.append(segment.curve(point))
@@ -182,8 +210,32 @@ class Arc:
         return np.array(self.centre) + radial, self.angle_rad * tangential, -(self.angle_rad**2) * radial
 
 
+@dataclass(frozen=True)
+class Spiral:
+    """The points ``centre + p radius (cos(p angle), sin(p angle))`` over a parameter p from 0 to 1."""
+
+    centre: Point
+    radius: float
+    angle_rad: float
+
+    @property
+    def end(self) -> Point:
+        """Last point."""
+        point, _, _ = self.evaluate(1.0)
+        return float(point[0]), float(point[1])
+
+    def evaluate(self, progress: float) -> tuple[Array, Array, Array]:
+        """Return the point at ``progress`` and its first two derivatives with respect to it."""
+        angle, turn = progress * self.angle_rad, self.angle_rad
+        radial = self.radius * np.array([math.cos(angle), math.sin(angle)])
+        tangential = np.array([-radial[1], radial[0]])
+        first = radial + progress * turn * tangential
+        second = 2.0 * turn * tangential - progress * turn**2 * radial
+        return np.array(self.centre) + progress * radial, first, second
+
+
 def read_path(path: Path | str) -> TaskPath:
-    """Read a path file: ``{"name", "tool_angle_rad", "start": [x, y], "segments": [{"line": ...}, {"arc": ...}]}``.
+    """Read a path file: ``{"name", "tool_angle_rad", "start": [x, y], "segments": [{"line": ...}, ...]}``.
 
     Raises:
         InputError: the file cannot be read, is not strict JSON, or is not a path; the message names the field.

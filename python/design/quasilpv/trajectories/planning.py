@@ -2,7 +2,7 @@
 
 At every knot angle, speed and acceleration are those of the exact inverse kinematics,
 
-    S = f(theta),    theta' = J^-1 S',    theta'' = J^-1 (S'' - J' theta'),    S = (X, Y, Phi)
+    S = f(theta),    theta' = J^-1 S',    theta'' = J^-1 (S'' - J' theta'),    S = (X, Y, Phi) or (X, Y)
 
 and the quintic Hermite polynomial between two knots takes both ends' values. The distance from the path is then
 *measured* halfway between knots, where the error of the interpolation is largest, and the knots are refined until it is
@@ -25,30 +25,37 @@ from quasilpv.trajectories.paths import TaskPath
 
 Array = npt.NDArray[np.float64]
 
-MIN_ELBOW_SINE = 0.05
+MIN_SINGULARITY = 0.05
 KNOT_SPACING_S = 0.01
 FIT_TOLERANCE_M = 1e-9
 MAX_REFINEMENTS = 6
 
 
 class Kinematics(Protocol):
-    """What planning needs of an arm; a pose is (X, Y, Phi), and det J vanishes with sin(theta_2)."""
+    """What planning needs of a robot; a pose is (X, Y, Phi), or (X, Y) if the tool has no orientation of its own."""
 
     @property
     def name(self) -> str:
         """Identifier in errors and in the trajectory file."""
 
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+
     def forward_kinematics(self, theta: npt.ArrayLike) -> Array:
-        """Pose (3,) of the tool."""
+        """Pose of the tool, as many coordinates as joints."""
 
     def inverse_kinematics(self, pose: npt.ArrayLike) -> Array:
         """Joint angles (n,); ``InputError`` if the pose is out of reach."""
 
     def jacobian(self, theta: npt.ArrayLike) -> Array:
-        """J, (3, n)."""
+        """J, (n, n)."""
 
     def jacobian_rate_times_speed(self, theta: npt.ArrayLike, omega: npt.ArrayLike) -> Array:
-        """J' theta', (3,)."""
+        """J' theta', (n,)."""
+
+    def singularity(self, theta: npt.ArrayLike) -> tuple[str, float]:
+        """A quantity in [0, 1] that vanishes with det J, with its name."""
 
 
 def plan(
@@ -71,10 +78,12 @@ def plan(
         The trajectory; its ``task`` records the path, the robot, the largest knot spacing and the measured fit errors.
 
     Raises:
-        InputError: somewhere on the path the tool is out of reach, the arm is singular, or a joint leaves the modelling
-            box; the message says where, when and by how much. Or the fit does not reach ``FIT_TOLERANCE_M``.
+        InputError: the path says nothing of the orientation of a tool that has one, or of one that has none; somewhere
+            on the path the tool is out of reach, the robot is singular, or a joint leaves the modelling box; the
+            message says where, when and by how much. Or the fit does not reach ``FIT_TOLERANCE_M``.
     """
     source = source or path.name
+    _require_orientation(arm, path, source)
     for refinement in range(MAX_REFINEMENTS + 1):
         spacing = knot_spacing_s / 2**refinement
         knots = _knots(path, spacing)
@@ -100,24 +109,26 @@ def joint_motion(arm: Kinematics, path: TaskPath, times_s: Array, source: str) -
     """Return angles, speeds and accelerations (times, n) of the exact inverse kinematics, angles without jumps of 2 pi.
 
     Raises:
-        InputError: out of reach or singular (|sin(theta_2)| below ``MIN_ELBOW_SINE``) at one of the times.
+        InputError: out of reach or singular (``singularity`` below ``MIN_SINGULARITY``) at one of the times.
     """
     angles, speeds, accelerations = [], [], []
+    at_rest = [0.0] * len(path.orientation)
     for time in times_s:
         task = path.evaluate(float(time))
         try:
-            theta = arm.inverse_kinematics([*task.position, path.tool_angle_rad])
+            theta = arm.inverse_kinematics([*task.position, *path.orientation])
         except InputError as error:
             raise InputError(source, _place(path, time), error.got, error.expected) from error
-        if not (sine := abs(np.sin(theta[1]))) >= MIN_ELBOW_SINE:
-            expected = f"at least {MIN_ELBOW_SINE} (the arm is singular when straight or folded)"
-            raise InputError(source, _place(path, time), f"|sin(theta_2)| = {sine:.3g}", expected)
+        measure, value = arm.singularity(theta)
+        if not value >= MIN_SINGULARITY:
+            expected = f"at least {MIN_SINGULARITY} (the robot is singular when links align)"
+            raise InputError(source, _place(path, time), f"{measure} = {value:.3g}", expected)
         J = arm.jacobian(theta)
-        omega = np.linalg.solve(J, [*task.velocity, 0.0])
+        omega = np.linalg.solve(J, [*task.velocity, *at_rest])
         drift = arm.jacobian_rate_times_speed(theta, omega)
         angles.append(theta)
         speeds.append(omega)
-        accelerations.append(np.linalg.solve(J, [*task.acceleration, 0.0] - drift))
+        accelerations.append(np.linalg.solve(J, [*task.acceleration, *at_rest] - drift))
     return Reference(np.unwrap(np.array(angles), axis=0), np.array(speeds), np.array(accelerations))
 
 
@@ -143,7 +154,14 @@ def fit_errors(arm: Kinematics, path: TaskPath, trajectory: Trajectory) -> tuple
     poses = np.array([arm.forward_kinematics(angle) for angle in trajectory.evaluate(middles).angle])
     positions = np.array([path.evaluate(float(time)).position for time in middles])
     distances = np.linalg.norm(poses[:, :2] - positions, axis=1)
-    return float(distances.max()), float(np.abs(poses[:, 2] - path.tool_angle_rad).max())
+    turned = np.abs(poses[:, 2:] - np.array(path.orientation))
+    return float(distances.max()), float(turned.max(initial=0.0))
+
+
+def _require_orientation(arm: Kinematics, path: TaskPath, source: str) -> None:
+    if 2 + len(path.orientation) != arm.joints:
+        expected = f"a path of {arm.joints} coordinates, as {arm.name} has joints: an orientation with 3, none with 2"
+        raise InputError(source, "tool_angle_rad", path.tool_angle_rad, expected)
 
 
 def _knots(path: TaskPath, spacing_s: float) -> Array:

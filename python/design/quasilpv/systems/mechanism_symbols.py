@@ -1,4 +1,4 @@
-"""The planar serial arm in symbols: the same closed form as `arms`, its premises and its descriptor model."""
+"""A planar mechanism in symbols: the same closed form as `mechanism`, its premises and its descriptor model."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.premise import Premise, PremiseKind
 
 if TYPE_CHECKING:
-    from quasilpv.systems.arms import PlanarSerialArm
+    from quasilpv.systems.mechanism import PlanarMechanism
 
 
 @dataclass(frozen=True)
-class SymbolicArm:
+class SymbolicMechanism:
     """``M theta'' + N omega + G = Gamma`` as sympy matrices.
 
     Attributes:
         theta: the n joint angles (rad), symbols ``theta_1`` ... ``theta_n``.
         omega: the n joint speeds (rad/s), symbols ``omega_1`` ... ``omega_n``.
         inertia: M(theta), n x n, kg m^2.
-        coriolis: N(theta, omega), n x n, friction included, in the arm's factorisation.
+        coriolis: N(theta, omega), n x n, friction included, in the mechanism's factorisation.
         gravity: G(theta), n x 1, N m.
         stiffness: H(theta), n x n, with G = H theta, N m.
+        cosines: ``cos(alpha_l - alpha_k)`` in the order of `PlanarMechanism.inertia_premises`.
         velocity_premises: the scalar functions of (theta, omega) in which N is affine.
         stiffness_premises: the scalar functions of theta in which H is affine.
     """
@@ -38,28 +39,28 @@ class SymbolicArm:
     coriolis: sp.Matrix
     gravity: sp.Matrix
     stiffness: sp.Matrix
+    cosines: tuple[sp.Expr, ...]
     velocity_premises: tuple[sp.Expr, ...]
     stiffness_premises: tuple[sp.Expr, ...]
 
     @classmethod
-    def of(cls, arm: PlanarSerialArm) -> SymbolicArm:
-        """Write the closed form of an arm."""
-        n = arm.joints
+    def of(cls, mechanism: PlanarMechanism) -> SymbolicMechanism:
+        """Write the closed form of a mechanism."""
+        n = mechanism.joints
         theta = sp.symbols(f"theta_1:{n + 1}", real=True)
         omega = sp.symbols(f"omega_1:{n + 1}", real=True)
-        alpha = [sp.Add(*theta[: k + 1]) for k in range(n)]
-        W = [sp.Add(*omega[: k + 1]) for k in range(n)]
-        S = sp.Matrix([[int(i >= j) for j in range(n)] for i in range(n)])
-        D = arm.inertia_constants
-        gravity = [sp.Float(arm.equilibrium_sign * g) for g in arm.gravity_constants]
+        S = sp.Matrix(n, n, mechanism.absolute_map.astype(int).ravel().tolist())
+        alpha, W = list(S * sp.Matrix(theta)), list(S * sp.Matrix(omega))
+        D = mechanism.inertia_constants
+        gravity = [sp.Float(mechanism.equilibrium_sign * g) for g in mechanism.gravity_constants]
 
         inertia = S.T * sp.Matrix(n, n, lambda k, j: sp.Float(D[k, j]) * sp.cos(alpha[k] - alpha[j])) * S
         coriolis = S.T * sp.Matrix(n, n, lambda k, j: sp.Float(D[k, j]) * sp.sin(alpha[k] - alpha[j]) * W[j]) * S
-        if arm.printed_coriolis_shift:
-            shift = sp.Float(arm.printed_coriolis_shift * D[0, 1]) * sp.sin(theta[1])
+        if mechanism.printed_coriolis_shift:
+            shift = sp.Float(mechanism.printed_coriolis_shift * D[0, 1]) * sp.sin(theta[1])
             coriolis[0, 0] += shift * omega[1]
             coriolis[0, 1] -= shift * omega[0]
-        coriolis += sp.diag(*(sp.Float(f) for f in arm.friction_nm_s))
+        coriolis += sp.diag(*(sp.Float(f) for f in mechanism.friction_nm_s))
         sinc_terms = sp.diag(*(g * sp.sinc(a) for g, a in zip(gravity, alpha, strict=True)))
         return cls(
             theta,
@@ -68,15 +69,14 @@ class SymbolicArm:
             coriolis.applyfunc(sp.expand),
             S.T * sp.Matrix([g * sp.sin(a) for g, a in zip(gravity, alpha, strict=True)]),
             (S.T * sinc_terms * S).applyfunc(sp.expand),
-            _velocity_premises(arm, theta, omega),
-            _stiffness_premises(arm, theta, gravity),
+            tuple(sp.cos(alpha[j] - alpha[k]) for k, j in _pairs(n)),
+            _velocity_premises(mechanism, theta, omega, alpha, W),
+            _stiffness_premises(mechanism, alpha, gravity),
         )
 
     def inertia_premises(self, domain: OperatingDomain) -> tuple[Premise, ...]:
-        """See `PlanarSerialArm.inertia_premises`."""
-        n = len(self.theta)
-        cosines = [sp.cos(sum(self.theta[k + 1 : k + gap + 1])) for gap in range(1, n) for k in range(n - gap)]
-        return self._over(domain, cosines, first=1, kind=PremiseKind.MEASURED)
+        """See `PlanarMechanism.inertia_premises`."""
+        return self._over(domain, self.cosines, first=1, kind=PremiseKind.MEASURED)
 
     def premises(self, domain: OperatingDomain) -> tuple[Premise, ...]:
         """All premises of the descriptor model, in the order of Example I.2 for n = 2, of Table I.3 otherwise."""
@@ -90,7 +90,7 @@ class SymbolicArm:
         return premises
 
     def descriptor_system(self, name: str, domain: OperatingDomain) -> DescriptorSystem:
-        """See `PlanarSerialArm.as_descriptor_system`."""
+        """See `PlanarMechanism.as_descriptor_system`."""
         n = len(self.theta)
         identity, zero = sp.eye(n), sp.zeros(n, n)
         return DescriptorSystem.from_symbols(
@@ -120,14 +120,23 @@ class SymbolicArm:
         )
 
 
+def _pairs(n: int) -> list[tuple[int, int]]:
+    """All k < l, neighbours first."""
+    return [(k, k + gap) for gap in range(1, n) for k in range(n - gap)]
+
+
 def _velocity_premises(
-    arm: PlanarSerialArm, theta: tuple[sp.Symbol, ...], omega: tuple[sp.Symbol, ...]
+    mechanism: PlanarMechanism,
+    theta: tuple[sp.Symbol, ...],
+    omega: tuple[sp.Symbol, ...],
+    alpha: list[sp.Expr],
+    W: list[sp.Expr],
 ) -> tuple[sp.Expr, ...]:
     sin = sp.sin
-    if arm.coriolis_factorisation == "printed" and arm.joints == 2:
-        c2 = sp.Float(arm.inertia_constants[0, 1])
+    if mechanism.printed_coriolis_shift and mechanism.joints == 2:
+        c2 = sp.Float(mechanism.inertia_constants[0, 1])
         return (c2 * omega[1] * sin(theta[1]), -c2 * omega[0] * sin(theta[1]))
-    if arm.coriolis_factorisation == "printed":
+    if mechanism.printed_coriolis_shift:
         (_, t2, t3), (w1, w2, w3) = theta, omega
         tool = w1 + w2 + w3
         return (
@@ -138,17 +147,15 @@ def _velocity_premises(
             tool * sin(t3),
             tool * sin(t2 + t3),
         )
-    n = len(theta)
-    pairs = [(k, k + gap) for gap in range(1, n) for k in range(n - gap)]
-    return tuple(sum(omega[: link + 1]) * sin(sum(theta[k + 1 : j + 1])) for k, j in pairs for link in (k, j))
+    return tuple(W[link] * sin(alpha[j] - alpha[k]) for k, j in _pairs(mechanism.joints) for link in (k, j))
 
 
 def _stiffness_premises(
-    arm: PlanarSerialArm, theta: tuple[sp.Symbol, ...], gravity: list[sp.Expr]
+    mechanism: PlanarMechanism, alpha: list[sp.Expr], gravity: list[sp.Expr]
 ) -> tuple[sp.Expr, ...]:
     if all(g == 0 for g in gravity):
         return ()
-    sincs = [sp.sinc(sum(theta[: k + 1])) for k in range(len(theta))]
-    if arm.coriolis_factorisation == "printed" and arm.joints == 2:
+    sincs = [sp.sinc(angle) for angle in alpha]
+    if mechanism.printed_coriolis_shift and mechanism.joints == 2:
         return (-gravity[0] * sincs[0] - gravity[1] * sincs[1], -gravity[1] * sincs[1])
     return tuple(sincs)
