@@ -84,13 +84,11 @@ TEST_P(EveryLaw, gives_over_a_link_in_lock_step_the_samples_of_the_in_process_ru
   EXPECT_EQ(k, static_cast<std::size_t>(kSamples));
 }
 
-INSTANTIATE_TEST_SUITE_P(Loop, EveryLaw,
-                         ::testing::Values("dob-acceleration", "dob-torque", "hinf-tracking", "pid", "ctc", "ctc-dob"),
-                         [](const auto& kind) {
-                           std::string name = kind.param;
-                           std::replace(name.begin(), name.end(), '-', '_');
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(Loop, EveryLaw, ::testing::ValuesIn(::quasilpv::testing::kLawKinds), [](const auto& kind) {
+  std::string name = kind.param;
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
 
 TEST(PlantLoop, when_the_first_copy_of_every_measurement_is_lost_expect_the_same_samples) {
   constexpr std::int64_t kSamples = 5;

@@ -25,13 +25,16 @@ from reference.step import (
     Pid,
     Sample,
     SpeedFilter,
+    StateFeedback,
+    Window,
 )
 
 RELATIVE_TOLERANCE = 1e-12  # of the largest summand: observer gains make single summands large
 RUNS, STEPS_PER_RUN = 200, 5
+PERIODS = 3 * STEPS_PER_RUN  # of a run of `delayed-feedback`, longer than its moving window
 FILTER_S = 2e-3
 
-Reference = DobAcceleration | DobTorque | HinfTracking | Pid | ComputedTorque
+Reference = DobAcceleration | DobTorque | HinfTracking | StateFeedback | Pid | ComputedTorque
 Builder = Callable[[SerialArm, np.random.Generator, OutputStage], tuple[dict[str, Any], Callable[[], Reference]]]
 
 
@@ -164,11 +167,112 @@ def hinf_tracking(
     return law, lambda: HinfTracking(numerator.at, lyapunov, arm.mass_matrix, speed_filter(), fresh(output))
 
 
+BOUNDS = np.array([1.0, 6.0])
+"""Of the schedule cos(theta_2), omega_1 sin(theta_2): random speeds leave the second interval."""
+
+
+def schedule_weights(y: FloatArray, w: FloatArray) -> FloatArray:
+    """Weights of the four vertices of two blocks, from the definition."""
+    z = np.clip([np.cos(y[1]), w[0] * np.sin(y[1])], -BOUNDS, BOUNDS)
+    upper = (z + BOUNDS) / (2.0 * BOUNDS)
+    return np.column_stack([1.0 - upper, upper]).ravel() / 2.0
+
+
+def schedule_table(vertices: FloatArray) -> dict[str, Any]:
+    return BlockPolytope.per_premise(-BOUNDS, BOUNDS).to_document(vertices)
+
+
+def random_gains(count: int, n: int, rng: np.random.Generator) -> FloatArray:
+    stiff = np.hstack([-3000.0 * np.eye(n), -200.0 * np.eye(n)])
+    return np.asarray(stiff * rng.uniform(0.5, 1.5, (count, 1, 1)) + rng.normal(0.0, 30.0, (count, n, 2 * n)))
+
+
+def random_lyapunov(count: int, n: int, rng: np.random.Generator) -> FloatArray:
+    root = np.eye(2 * n) + 0.15 * rng.normal(size=(count, 2 * n, 2 * n))
+    square = root @ root.swapaxes(1, 2)
+    return np.asarray((square + square.swapaxes(1, 2)) / 2.0)
+
+
+def descriptor(arm: SerialArm, y: FloatArray) -> FloatArray:
+    n = len(arm.links)
+    E = np.eye(2 * n)
+    E[n:, n:] = arm.mass_matrix(y)
+    return E
+
+
+def state_feedback(
+    arm: SerialArm, rng: np.random.Generator, output: OutputStage
+) -> tuple[dict[str, Any], Callable[[], Reference]]:
+    gains = random_gains(4, len(arm.links), rng)
+    law = {"kind": "state-feedback", "gain": schedule_table(gains), "velocity_filter_time_constant_s": FILTER_S}
+
+    def gain(y: FloatArray, w: FloatArray) -> FloatArray:
+        return np.asarray(np.tensordot(schedule_weights(y, w), gains, axes=1))
+
+    return law, lambda: StateFeedback(gain, speed_filter(), fresh(output))
+
+
+def descriptor_feedback(
+    arm: SerialArm, rng: np.random.Generator, output: OutputStage
+) -> tuple[dict[str, Any], Callable[[], Reference]]:
+    n = len(arm.links)
+    numerators, lyapunov = random_gains(4, n, rng), random_lyapunov(1, n, rng)[0]
+    law = {
+        "kind": "descriptor-feedback",
+        "numerator": schedule_table(numerators),
+        "lyapunov": lyapunov.tolist(),
+        "velocity_filter_time_constant_s": FILTER_S,
+    }
+
+    def gain(y: FloatArray, w: FloatArray) -> FloatArray:
+        F = np.tensordot(schedule_weights(y, w), numerators, axes=1)
+        return np.asarray(F @ np.linalg.inv(lyapunov @ descriptor(arm, y).T))
+
+    return law, lambda: StateFeedback(gain, speed_filter(), fresh(output))
+
+
+def delayed_feedback(periods: int, *, regular: bool) -> Builder:
+    def build(
+        arm: SerialArm, rng: np.random.Generator, output: OutputStage
+    ) -> tuple[dict[str, Any], Callable[[], Reference]]:
+        n = len(arm.links)
+        numerators, lyapunov = random_gains(64, n, rng), random_lyapunov(4, n, rng)
+        law = {
+            "kind": "delayed-feedback",
+            "lyapunov": schedule_table(lyapunov),
+            "numerators": numerators.tolist(),
+            "window_samples": periods,
+            "descriptor": regular,
+            "velocity_filter_time_constant_s": FILTER_S,
+        }
+
+        def start() -> Reference:
+            window = Window(periods)
+
+            def gain(y: FloatArray, w: FloatArray) -> FloatArray:
+                weights = schedule_weights(y, w)
+                mean, delayed = window.moved(weights)
+                F = np.einsum("j,k,m,jkmab->ab", weights, mean, delayed, numerators.reshape(4, 4, 4, n, 2 * n))
+                P = np.tensordot(mean, lyapunov, axes=1)
+                return np.asarray(F @ np.linalg.inv(P @ descriptor(arm, y).T if regular else P))
+
+            return StateFeedback(gain, speed_filter(), fresh(output))
+
+        return law, start
+
+    return build
+
+
 LAWS: dict[str, Builder] = {
     "dob-acceleration": dob_acceleration(compensate=True),
     "dob-acceleration without compensation": dob_acceleration(compensate=False),
     "dob-torque": dob_torque,
     "hinf-tracking": hinf_tracking,
+    "state-feedback": state_feedback,
+    "descriptor-feedback": descriptor_feedback,
+    "delayed-feedback": delayed_feedback(5, regular=True),
+    "delayed-feedback without E": delayed_feedback(5, regular=False),
+    "delayed-feedback in the limit of a short window": delayed_feedback(0, regular=True),
     "pid": pid,
     "ctc": computed_torque(0.0),
     "ctc-dob": computed_torque(200.0),
@@ -203,11 +307,12 @@ def test_when_inputs_are_random_expect_the_step_of_the_formulas(name: str, joint
     table = {"torque_nm": output.torque_nm.tolist(), "slew_nm_per_s": output.slew_nm_per_s.tolist()}
     controller = _runtime.Controller(_runtime.Artifact.parse(artifact_bytes(arm, law, table)))
     limited = 0
+    steps = PERIODS if law["kind"] == "delayed-feedback" else STEPS_PER_RUN
     for _ in range(RUNS):
         controller.reset()
         reference = make_reference()
         scale = 0.0
-        for _ in range(STEPS_PER_RUN):
+        for _ in range(steps):
             report, answer = step_both(controller, reference, random_sample(joints, rng))
             scale = max(scale, answer.scale)  # the state carries what earlier summands rounded off
             for mine, theirs in (

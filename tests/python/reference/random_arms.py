@@ -84,4 +84,6 @@ def programs(arm: PlanarSerialArm, kind: str) -> dict[str, Any]:
         vectors["coriolis_reference"] = list(model.coriolis * sp.Matrix(reference_speed))
     elif kind in ("ctc", "ctc-dob"):
         vectors["coriolis"] = list(model.coriolis * sp.Matrix(model.omega))
+    elif kind in ("state-feedback", "descriptor-feedback", "delayed-feedback"):
+        vectors["schedule"] = [sp.cos(model.theta[1]), model.omega[0] * sp.sin(model.theta[1])]
     return {name: compile_program(vector, inputs).model_dump(mode="json") for name, vector in vectors.items()}

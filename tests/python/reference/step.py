@@ -198,6 +198,43 @@ class HinfTracking:
 
 
 @dataclass
+class StateFeedback:
+    """u = K(z) x with x = (y - r, w - r'), z of angles and filtered speeds; K may depend on the past of z.
+
+    ``gain`` is called once per sample, in order, with (y, w).
+    """
+
+    gain: SpeedModel
+    speed_filter: SpeedFilter
+    output: OutputStage
+
+    def step(self, s: Sample) -> Answer:
+        w = self.speed_filter.apply(s.speed)
+        state = np.concatenate([s.angle - s.reference_angle, w - s.reference_speed])
+        K = self.gain(s.angle, w)
+        commanded = K @ state
+        applied = self.output.apply(commanded)
+        return Answer(commanded, applied, np.zeros_like(w), (np.abs(K) @ np.abs(state),))
+
+
+@dataclass
+class Window:
+    """The last N + 1 weights: their mean by the trapezoidal rule over N sample periods, and the first of them.
+
+    N = 0 is the limit of a short window. Before the first sample the weights count as constant.
+    """
+
+    periods: int
+    past: list[FloatArray] = field(default_factory=list)
+
+    def moved(self, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+        self.past = [*(self.past or [weights] * (self.periods + 1)), weights][-self.periods - 1 :]
+        if self.periods == 0:
+            return weights, weights
+        return np.asarray(np.trapezoid(self.past, axis=0) / self.periods), self.past[0]
+
+
+@dataclass
 class Pid:
     """u = kp e + kd (r' - w) + ki int e + M r'' + N(y, w) r' + G with e = r - y (Dehak 2022, III.54)."""
 

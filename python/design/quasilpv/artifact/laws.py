@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -49,14 +49,13 @@ class _VelocityLaw(_Law):
 class _ScheduledLaw(_VelocityLaw):
     """A law whose gains have premises of their own, of angles and speeds: the program ``schedule``."""
 
-    @property
-    def schedule(self) -> PolytopeTable:
-        """The table over these premises."""
-        raise NotImplementedError
+    scheduled: ClassVar[str]
+    """The field that holds the table over these premises."""
 
     def premises_of(self, program: str) -> int | None:
         """See `_Law.premises_of`."""
-        return self.schedule.premises if program == "schedule" else super().premises_of(program)
+        table: PolytopeTable = getattr(self, self.scheduled)
+        return table.premises if program == "schedule" else super().premises_of(program)
 
 
 class DobAccelerationLaw(_Law):
@@ -111,6 +110,8 @@ class StateFeedbackLaw(_ScheduledLaw):
     ``gain`` holds K, n x 2n, over the premises of the program ``schedule``.
     """
 
+    scheduled: ClassVar[str] = "gain"
+
     kind: Literal["state-feedback"]
     gain: PolytopeTable
 
@@ -118,17 +119,14 @@ class StateFeedbackLaw(_ScheduledLaw):
         """See `_Law.check`."""
         self.gain.require_shape("law.gain", joints, 2 * joints)
 
-    @property
-    def schedule(self) -> PolytopeTable:
-        """See `_ScheduledLaw.schedule`."""
-        return self.gain
-
 
 class DescriptorFeedbackLaw(_ScheduledLaw):
     """Descriptor feedback (Dehak 2022, II.38): ``Gamma = F(z) diag(I, M)^-1 P^-1 (y - r, w - r')``.
 
     ``numerator`` holds F, n x 2n, over the premises of the program ``schedule``; ``lyapunov`` is P, 2n x 2n.
     """
+
+    scheduled: ClassVar[str] = "numerator"
 
     kind: Literal["descriptor-feedback"]
     numerator: PolytopeTable
@@ -139,11 +137,6 @@ class DescriptorFeedbackLaw(_ScheduledLaw):
         self.numerator.require_shape("law.numerator", joints, 2 * joints)
         require_lyapunov("law.lyapunov", self.lyapunov, 2 * joints)
 
-    @property
-    def schedule(self) -> PolytopeTable:
-        """See `_ScheduledLaw.schedule`."""
-        return self.numerator
-
 
 class DelayedFeedbackLaw(_ScheduledLaw):
     """Feedback with a moving window (Dehak 2022, II.49 and II.69): ``Gamma = F diag(I, M)^-1 P(varpi)^-1 x``.
@@ -152,6 +145,8 @@ class DelayedFeedbackLaw(_ScheduledLaw):
     fastest; ``window_samples`` is tau/T, or 0 for the limit of a short window; without ``descriptor`` diag(I, M) is
     left out.
     """
+
+    scheduled: ClassVar[str] = "lyapunov"
 
     kind: Literal["delayed-feedback"]
     lyapunov: PolytopeTable
@@ -173,11 +168,6 @@ class DelayedFeedbackLaw(_ScheduledLaw):
         if 0 < self.window_samples < MIN_WINDOW_SAMPLES:
             expected = f"0 (the limit of a short window) or at least {MIN_WINDOW_SAMPLES} sample periods"
             raise FieldError("law.window_samples", self.window_samples, expected)
-
-    @property
-    def schedule(self) -> PolytopeTable:
-        """See `_ScheduledLaw.schedule`."""
-        return self.lyapunov
 
 
 class PidLaw(_VelocityLaw):
