@@ -49,8 +49,9 @@ class Plant {
   /// c_j dF/dy' + dF/dy into `jacobian`, shape [size x size]: the iteration matrix of implicit multistep methods.
   virtual void jacobian(double t, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept = 0;
 
-  /// The explicit form: y' of the differential components from one mass-matrix solve, 0 for the algebraic ones (which
-  /// are not read). Throws PlantError where the mass matrix is singular.
+  /// The explicit form: y' of the differential components from one solution of the equations of motion, multipliers
+  /// included, and 0 for the algebraic components, which are not read. Throws PlantError where there is no solution: a
+  /// singular mass matrix or configuration.
   virtual void derivative(double t, ConstVector y, Vector y_dot) const = 0;
 
   /// Makes (y, y') satisfy F = 0 and the hidden constraints, as an integrator needs it after a jump of the torque.
