@@ -133,7 +133,7 @@ DECAY_OF_THE_ERROR = "he(closed[i] @ E[j].T) + (E[i] @ P @ E[j].T) * (2 * decay)
 BOUNDED_REAL_ROW = "[decreasing, constant(B), E[i] @ P @ C.T]"
 DISK_ROW = "(E[i] @ P @ E[j].T) * -disk, closed[i]]"
 EQUAL = 'problem.negative(f"{name} {i} {i} {label}".rstrip(), grid[i][i] + shift.at((i, i, *rest)))'
-OFF_DIAGONAL = "grid[i][i] * own + grid[i][j] + grid[j][i]"
+OFF_DIAGONAL = "tuan = diagonal + grid[i][j] + grid[j][i]"
 
 REDUCED_FEEDBACK = (
     Mutant("closed loop sign", "[A @ P + B @ Yi for", "[A @ P - B @ Yi for"),
@@ -156,8 +156,8 @@ REDUCED_FEEDBACK = (
     Mutant("disk 12", DISK_ROW, "(E[i] @ P @ E[j].T) * -disk, zeros(3 * n, 3 * n)]"),
     Mutant("disk 22", "[None, P * -disk]]", "[None, P * (-2 * disk)]]"),
     Mutant("sum, equal indices", EQUAL, "pass", BLOCKS),
-    Mutant("sum, unequal indices", OFF_DIAGONAL, "grid[i][i] * own", BLOCKS),
-    Mutant("sum, sign", OFF_DIAGONAL, "grid[i][i] * own - grid[i][j] - grid[j][i]", BLOCKS),
+    Mutant("sum, unequal indices", OFF_DIAGONAL, "tuan = diagonal", BLOCKS),
+    Mutant("sum, sign", OFF_DIAGONAL, "tuan = diagonal - grid[i][j] - grid[j][i]", BLOCKS),
 )
 
 REDUCED_OBSERVER = (
