@@ -30,7 +30,7 @@ from quasilpv.systems.registry import robot
 from quasilpv.trajectories import Trajectory
 
 ARM3 = robot("arm3")
-TRAJECTORIES = {task.id: task.trajectory(ARM3.model, ARM3.domain) for task in tracking_tasks()}
+TRAJECTORIES = {task.id: task.trajectory(ARM3.model, ARM3.domain) for task in tracking_tasks() if task.robot == "arm3"}
 SQUARE = TRAJECTORIES["serial-square"]
 FORMATS = Path(__file__).parents[2] / "docs" / "reference" / "formats.md"
 
@@ -40,15 +40,21 @@ def arm_of(scenario: Scenario) -> SerialArmPlant:
     return scenario.plant
 
 
-def test_when_the_registry_is_listed_expect_the_two_tracking_experiments_of_the_serial_arm() -> None:
+def test_when_the_registry_is_listed_expect_two_paths_of_the_serial_arm_and_one_of_the_five_bar_robot() -> None:
     assert list(TRAJECTORIES) == ["serial-square", "serial-circle"]
-    assert {task.robot for task in tracking_tasks()} == {"arm3"}
+    spirals = {task.id: task for task in tracking_tasks() if task.robot == "fivebar"}
+    assert list(spirals) == ["fivebar-spiral", "fivebar-spiral-fast", "fivebar-spiral-strong"]
+    for name, frequency, amplitude in (("fivebar-spiral", 5.0, 15.0), ("fivebar-spiral-strong", 50.0, 100.0)):
+        first, second = spirals[name].external_torque
+        assert (first.joint, second.joint) == (0, 1)
+        assert (first.frequency_rad_s, second.frequency_rad_s) == (50.0, frequency)
+        assert first.amplitude_nm == second.amplitude_nm == amplitude
     assert all(trajectory.name == name for name, trajectory in TRAJECTORIES.items())
 
 
 def test_when_a_scenario_is_unknown_expect_the_known_ones_in_the_error() -> None:
     assert tracking_task("serial-circle").id == "serial-circle"
-    with pytest.raises(InputError, match="got spiral, expected one of serial-square, serial-circle"):
+    with pytest.raises(InputError, match="got spiral, expected one of serial-square, serial-circle, fivebar-spiral"):
         tracking_task("spiral")
 
 

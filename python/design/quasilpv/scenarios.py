@@ -1,9 +1,10 @@
 """Scenarios: an experiment the simulator can run, true plant included (``docs/reference/formats.md``).
 
-The registry holds the tracking experiments of Dehak (2022, III.3.3 and IV.5.1): the tool of the 3-DoF arm follows a
-square or three quarters of a circle while sinusoidal torques (III.53) act on the joints, on the nominal arm or with the
-payload of chapter IV. Encoders have 20 bits; the measured speed, which only the baseline laws read, carries white
-noise.
+The registry holds the tracking experiments of Dehak (2022, III.3.3, IV.5.1 and IV.5.2): the tool of the 3-DoF arm
+follows a square or three quarters of a circle while sinusoidal torques (III.53) act on the joints, that of the five-bar
+robot a spiral under those of (IV.77), of which the print gives the second frequency as 5 t or 50 t; on the nominal
+robot or with the payload of chapter IV. Encoders have 20 bits; the measured speed, which only the baseline laws read,
+carries white noise.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.systems.registry import Robot
-from quasilpv.trajectories import Trajectory, serial_circle, serial_square
+from quasilpv.trajectories import Trajectory, fivebar_spiral, serial_circle, serial_square
 from quasilpv.trajectories.planning import Kinematics
 
 Positive = Annotated[float, Field(gt=0)]
@@ -160,10 +161,16 @@ Integrator = Annotated[IdaIntegrator | Rk4Integrator, Field(discriminator="kind"
 TAGS = ("serial-arm", "five-bar", "spring-disc", "ida", "rk4")
 """The kinds that tell the cases of a union apart."""
 
-EXTERNAL_TORQUE = tuple(
-    SineTorque(joint=joint, amplitude_nm=amplitude, frequency_rad_s=15.0)
-    for joint, amplitude in enumerate((450.0, 375.0, 300.0))
-)
+
+def _sines(*terms: tuple[float, float]) -> tuple[SineTorque, ...]:
+    """One sine per joint, (amplitude in N m, frequency in rad/s) each."""
+    return tuple(
+        SineTorque(joint=joint, amplitude_nm=amplitude, frequency_rad_s=frequency)
+        for joint, (amplitude, frequency) in enumerate(terms)
+    )
+
+
+EXTERNAL_TORQUE = _sines((450.0, 15.0), (375.0, 15.0), (300.0, 15.0))
 """The disturbance of Dehak 2022 (III.53): joint torques, added to the control torque as they are."""
 
 
@@ -224,12 +231,27 @@ def _missing_members(given: object, complete: object, path: str) -> Iterator[str
 
 @dataclass(frozen=True)
 class TrackingTask:
-    """An entry of the registry: a robot by name and the reference it tracks."""
+    """An entry of the registry: a robot by name and the reference it tracks.
+
+    Attributes:
+        id: its name.
+        summary: one line for a listing.
+        robot: id of a robot.
+        trajectory: from the robot and its operating domain to the reference.
+        external_torque: sines on the joints.
+    """
 
     id: str
     summary: str
     robot: str
     trajectory: Callable[[Kinematics, OperatingDomain | None], Trajectory]
+    external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE
+
+
+def _spiral(name: str, disturbance: str, *terms: tuple[float, float]) -> TrackingTask:
+    """The spiral of the five-bar robot under one reading of (IV.77), or a stronger disturbance."""
+    summary = f"the five-bar robot draws a spiral in 5 s, disturbed by {disturbance}"
+    return TrackingTask(name, summary, "fivebar", fivebar_spiral, _sines(*terms))
 
 
 def tracking_tasks() -> tuple[TrackingTask, ...]:
@@ -237,6 +259,9 @@ def tracking_tasks() -> tuple[TrackingTask, ...]:
     return (
         TrackingTask("serial-square", "the 3-DoF arm draws a square of 0.4 m in 3 s", "arm3", serial_square),
         TrackingTask("serial-circle", "the 3-DoF arm draws 3/4 of a circle of 0.2 m in 3 s", "arm3", serial_circle),
+        _spiral("fivebar-spiral", "15 N m at 50 and 5 rad/s", (15.0, 50.0), (15.0, 5.0)),
+        _spiral("fivebar-spiral-fast", "15 N m at 50 rad/s on both joints", (15.0, 50.0), (15.0, 50.0)),
+        _spiral("fivebar-spiral-strong", "100 N m at 50 rad/s on both joints", (100.0, 50.0), (100.0, 50.0)),
     )
 
 

@@ -38,8 +38,12 @@ def cells(result: TrackResult, label: str) -> list[str]:
         label,
         f"{result.rate_hz:g}",
         *(f"{1e3 * length:.3g}" for length in lengths),
-        f"{metrics.rms_torque_nm:.0f}",
-        f"{metrics.rms_torque_increment_nm:.0f}",
+        *(_torque(value) for value in (metrics.rms_torque_nm, metrics.rms_torque_increment_nm)),
         f"{metrics.rms_velocity_error_rad_s:.2g}",
         "-" if growth is None else f"{growth:.2f}",
     ]
+
+
+def _torque(value_nm: float) -> str:
+    """A torque, N m, in whole numbers from 100 on, with three digits below."""
+    return f"{value_nm:.0f}" if value_nm >= 100.0 else f"{value_nm:.3g}"

@@ -17,7 +17,7 @@ from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import FloatArray, Run
-from quasilpv.scenarios import Sensors, build_scenario, tracking_task, write_scenario
+from quasilpv.scenarios import EXTERNAL_TORQUE, Sensors, SineTorque, build_scenario, tracking_task, write_scenario
 from quasilpv.systems.registry import Robot, robot
 from quasilpv.trajectories import Trajectory, plan, read_path, write_trajectory
 
@@ -35,11 +35,13 @@ class TrackingExperiment:
         name: scenario id, or the name in the path file.
         robot: from the registry.
         trajectory: the reference.
+        external_torque: sines on the joints.
     """
 
     name: str
     robot: Robot
     trajectory: Trajectory
+    external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE
 
     @classmethod
     def registered(cls, scenario_id: str) -> TrackingExperiment:
@@ -50,7 +52,8 @@ class TrackingExperiment:
         """
         task = tracking_task(scenario_id)
         task_robot = robot(task.robot)
-        return cls(task.id, task_robot, task.trajectory(task_robot.model, task_robot.domain))
+        trajectory = task.trajectory(task_robot.model, task_robot.domain)
+        return cls(task.id, task_robot, trajectory, task.external_torque)
 
     @classmethod
     def from_path_file(cls, path: Path | str, robot_id: str) -> TrackingExperiment:
@@ -91,7 +94,13 @@ def write_run_files(
         raise InputError(
             artifact.name, "robot.id", artifact.robot.id, f"{experiment.robot.id}, which {experiment.name} is for"
         )
-    scenario = build_scenario(experiment.robot, experiment.trajectory, plant=plant, sensors=sensors)
+    scenario = build_scenario(
+        experiment.robot,
+        experiment.trajectory,
+        plant=plant,
+        sensors=sensors,
+        external_torque=experiment.external_torque,
+    )
     return RunFiles(
         artifact=write_artifact(folder, artifact)[0],
         trajectory=write_trajectory(folder / TRAJECTORY_NAME, experiment.trajectory),
