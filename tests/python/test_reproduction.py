@@ -284,3 +284,22 @@ def test_when_the_command_is_asked_nothing_or_both_expect_one_line(
 ) -> None:
     assert run(["reproduce", *arguments]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def documented() -> dict[str, str]:
+    """Verdict of every item in the documentation."""
+    text = (ROOT / "docs" / "reproduction.md").read_text(encoding="utf-8")
+    return dict(re.findall(r"^\| ([a-z]+-[\w.]+) \| ([^|]+) \|", text, flags=re.MULTILINE))
+
+
+def test_the_documentation_lists_every_item_with_a_verdict() -> None:
+    assert list(documented()) == list(ITEMS)
+    assert set(documented().values()) <= {verdict.value for verdict in ItemVerdict}
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", ITEMS)
+def test_every_item_has_claims_and_the_documented_verdict(name: str, tmp_path: Path) -> None:
+    (row,) = reproduce([ITEMS[name]], Effort.QUICK, tmp_path)
+    assert row["checks"]
+    assert row["verdict"] == documented()[name]
