@@ -401,10 +401,14 @@ def test_when_vector_or_factors_have_the_wrong_length_expect_refusal() -> None:
         ARM3.perturbed([1.0, 1.0], [1.0, 1.0, 1.0])
 
 
-def test_scenario_plant_has_the_documented_members_and_only_describes_hanging_arms() -> None:
+def test_scenario_plant_has_the_documented_members_and_an_upright_arm_hangs_in_the_opposite_gravity() -> None:
     document = ARM3.plant_document("nominal")
     assert set(document) == {"kind", "label", "gravity_m_s2", "links"}
     assert set(document["links"][0]) == {"length_m", "mass_kg", "com_m", "inertia_kg_m2", "friction_nm_s"}
     assert_array_equal([link["inertia_kg_m2"] for link in document["links"]], [2.0, 1.9, 1.3])
-    with pytest.raises(InputError, match="hanging"):
-        replace(ARM3, equilibrium="upright").plant_document("nominal")
+    upright = replace(ARM3, equilibrium="upright")
+    assert upright.plant_document("nominal")["gravity_m_s2"] == -ARM3.gravity_m_s2
+    theta = np.array([0.3, -0.5, 1.1])
+    assert_array_equal(upright.gravity(theta), -ARM3.gravity(theta))
+    assert_array_equal(upright.gravity_stiffness(theta), -ARM3.gravity_stiffness(theta))
+    assert_allclose(ARM3.gravity_stiffness(theta) @ theta, ARM3.gravity(theta), rtol=1e-13)

@@ -1,7 +1,8 @@
 """The frozen sampled closed loop of a linear law and a plant with transport delay, for many configurations at once.
 
 At a fixed configuration a law against a plant of inertia M_t is a linear map from one sample to the next. Coriolis
-torque and the gradient of the mismatch of gravity are left out: they are disturbances. The joints need not decouple.
+torque and the gradient of the mismatch of gravity are left out: they are disturbances. A law that does not compensate
+gravity has it in its loop, as a stiffness H with G(theta) = H theta. The joints need not decouple.
 Time is counted in samples inside, so torques are in kg m^2 rad per sample squared.
 """
 
@@ -17,6 +18,7 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 _DOUBLINGS = 18
+_SERIES_TERMS = 10  # of the motion under a stiffness; enough while its fastest mode is slower than the sample rate
 
 
 class FrozenLaw(Protocol):
@@ -52,12 +54,13 @@ class FrozenLoop:
     """A law against plants of inertia ``plant_inertia`` with the torque delayed by ``delay_s``.
 
     The state is (theta, omega; the signals of the law; the ``floor(delay/T) + 1`` torques on their way, newest first),
-    n entries each. The plant is the exact zero-order-hold double integrator.
+    n entries each. The plant ``M_t theta'' = Gamma - H theta`` is sampled exactly; without H it is a double integrator.
 
     Attributes:
         law: at B configurations.
         plant_inertia: M_t, (B, n, n), kg m^2.
         delay_s: transport delay.
+        stiffness: H, (B, n, n), N m/rad; None for none.
         transition: per-sample map, (B, S, S).
         drive: effect of a constant disturbance torque (SI) over one sample, (B, S, n).
         noise: effect of errors of what is measured, angles (rad) and then speeds (rad/s), (B, S, measured n).
@@ -68,6 +71,7 @@ class FrozenLoop:
     law: FrozenLaw
     plant_inertia: FloatArray
     delay_s: float = 0.0
+    stiffness: FloatArray | None = None
     transition: FloatArray = field(init=False)
     drive: FloatArray = field(init=False)
     noise: FloatArray = field(init=False)
@@ -88,17 +92,38 @@ class FrozenLoop:
         torques = [command, *(signals[:, first_torque + k] for k in range(queue + 1))]
         mobility = np.linalg.inv(self.plant_inertia)
         new, old = mobility @ torques[queue], mobility @ torques[queue + 1]
-        position = theta + omega + (1.0 - late) ** 2 / 2.0 * new + (late - late**2 / 2.0) * old
-        speed = omega + (1.0 - late) * new + late * old
-        transition = np.concatenate([position, speed, *following, *torques[: queue + 1]], axis=1)
+        free, forced = self._motion(1.0)
+        after, by_new = self._motion(1.0 - late)
+        _, by_old = self._motion(late)
+        motion = free @ np.concatenate([theta, omega], axis=1) + by_new @ new + after @ by_old @ old
+        transition = np.concatenate([motion, *following, *torques[: queue + 1]], axis=1)
         drive = np.zeros((batch, size, n))
-        drive[:, :n], drive[:, n : 2 * n] = mobility * T**2 / 2.0, mobility * T**2
+        drive[:, : 2 * n] = forced @ mobility * T**2
         # Errors enter the law where theta and omega do, and not the plant.
         noise = transition[:, :, : self.law.measured * n].copy()
-        noise[:, : 2 * n] -= np.kron([[1.0, 1.0], [0.0, 1.0]], np.eye(n))[:, : noise.shape[2]]
+        noise[:, : 2 * n] -= free[:, :, : noise.shape[2]]
         noise *= self._per_unit_measured
         for name, value in (("transition", transition), ("drive", drive), ("noise", noise), ("torque", command / T**2)):
             object.__setattr__(self, name, value)
+
+    def _motion(self, duration: float) -> tuple[FloatArray, FloatArray]:
+        """(theta, omega) after a time, in samples, as maps of what they were and of a constant acceleration."""
+        batch, n, _ = self.plant_inertia.shape
+        if self.stiffness is None:
+            free = np.kron([[1.0, duration], [0.0, 1.0]], np.eye(n))
+            forced = np.kron([[duration**2 / 2.0], [duration]], np.eye(n))
+            return np.broadcast_to(free, (batch, *free.shape)), np.broadcast_to(forced, (batch, *forced.shape))
+        # cos and sin of the square root of X = M^-1 H, and the integral of the latter, by their power series in X.
+        X = np.linalg.solve(self.plant_inertia, self.stiffness) * (self.law.sample_period_s * duration) ** 2
+        term = np.broadcast_to(np.eye(n), X.shape)
+        cosine, sine, integral = np.zeros((3, *X.shape))
+        for k in range(_SERIES_TERMS):
+            cosine = cosine + term / math.factorial(2 * k)
+            sine = sine + duration * term / math.factorial(2 * k + 1)
+            integral = integral + duration**2 * term / math.factorial(2 * k + 2)
+            term = -term @ X
+        slope = -X @ sine / duration**2 if duration > 0.0 else np.zeros(X.shape)
+        return np.block([[cosine, sine], [slope, cosine]]), np.concatenate([integral, sine], axis=1)
 
     @property
     def joints(self) -> int:

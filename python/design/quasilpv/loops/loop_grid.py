@@ -53,11 +53,14 @@ class LoopGrid:
         law: frozen at B configurations.
         angles: these configurations, (B, n), rad.
         inertia: true inertia by payload fraction, (B, n, n) each, kg m^2.
+        stiffness: gravity as ``G(theta) = H theta``, H by payload fraction, (B, n, n) each, N m/rad, for laws that do
+            not compensate it; None for the others.
     """
 
     law: FrozenLaw
     angles: FloatArray
     inertia: Mapping[float, FloatArray]
+    stiffness: Mapping[float, FloatArray] | None = None
 
     def __len__(self) -> int:
         """Number of loops."""
@@ -66,7 +69,8 @@ class LoopGrid:
     def loops(self, factor: float = 1.0, delay_s: float = 0.0) -> Iterator[tuple[float, FrozenLoop]]:
         """Payload fraction and loops, one per configuration, with every true inertia multiplied by a factor."""
         for fraction, inertia in self.inertia.items():
-            yield fraction, FrozenLoop(self.law, factor * inertia, delay_s)
+            stiffness = None if self.stiffness is None else self.stiffness[fraction]
+            yield fraction, FrozenLoop(self.law, factor * inertia, delay_s, stiffness)
 
     def worst(self, factor: float = 1.0, delay_s: float = 0.0) -> WorstLoop:
         """The largest growth rate and where it occurs."""

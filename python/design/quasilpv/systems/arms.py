@@ -224,13 +224,11 @@ class PlanarSerialArm(PlanarMechanism):
         }
 
     def plant_document(self, label: str) -> dict[str, Any]:
-        """The ``plant`` member of a scenario file, whose arms hang at theta = 0.
+        """The ``plant`` member of a scenario file, whose arms hang at theta = 0 for gravity > 0.
 
-        Raises:
-            InputError: this arm counts its angles from the upward vertical.
+        An arm whose angles count from the upward vertical is, in those angles, one that hangs in the opposite gravity.
         """
-        if self.equilibrium != "hanging":
-            raise InputError(self.name, "equilibrium", self.equilibrium, "hanging, the only one a scenario describes")
         document = self.parameters_document()
         del document["equilibrium"]
+        document["gravity_m_s2"] *= self.equilibrium_sign
         return {"kind": "serial-arm", "label": label, **document}
