@@ -116,8 +116,8 @@ def test_descriptor_model_of_an_arm_is_its_forward_dynamics(arm: PlanarSerialArm
         assert_array_equal(C @ x, x[:n])
 
 
-def test_registry_knows_the_three_robots_and_gives_each_one_line() -> None:
-    assert [entry.id for entry in robots()] == ["arm2", "arm3", "fivebar"]
+def test_registry_knows_all_robots_and_gives_each_one_line() -> None:
+    assert {entry.id for entry in robots()} == {"arm2", "arm2-upright", "arm3", "arm3-light", "fivebar"}
     for entry in robots():
         assert robot(entry.id) == entry
         assert entry.summary

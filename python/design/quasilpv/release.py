@@ -82,7 +82,7 @@ def checked_artifact(design: TrackingDesign, allow_unverified: bool = False) -> 
         ClaimError: a claim does not hold, or the robust gate is not passed.
     """
     content = to_artifact(design).content()
-    if design.controller not in CHECKERS:
+    if design.law["kind"] not in CHECKERS:
         return Artifact.from_document(content)
     verdict = verify(content, content["name"])
     samples = float(design.inputs["specification"]["delay_samples"])

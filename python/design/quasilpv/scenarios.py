@@ -10,6 +10,7 @@ carries white noise.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +25,7 @@ from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.systems.registry import Robot
-from quasilpv.trajectories import Trajectory, fivebar_spiral, serial_circle, serial_square
+from quasilpv.trajectories import Trajectory, fivebar_spiral, rest, serial_circle, serial_square
 from quasilpv.trajectories.planning import Kinematics
 
 Positive = Annotated[float, Field(gt=0)]
@@ -239,6 +240,7 @@ class TrackingTask:
         robot: id of a robot.
         trajectory: from the robot and its operating domain to the reference.
         external_torque: sines on the joints.
+        initial_angle_rad: angles of the plant at t = 0, at rest; None to start on the reference.
     """
 
     id: str
@@ -246,6 +248,13 @@ class TrackingTask:
     robot: str
     trajectory: Callable[[Kinematics, OperatingDomain | None], Trajectory]
     external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE
+    initial_angle_rad: Vector | None = None
+
+
+def _stabilisation(name: str, summary: str, robot_id: str, joints: int) -> TrackingTask:
+    """From rest with the first joint at 22.5 degrees (Dehak 2022, fig. I.2), the reference being theta = 0 for 5 s."""
+    start = (math.pi / 8.0,) + (0.0,) * (joints - 1)
+    return TrackingTask(name, summary, robot_id, lambda _, __: rest(name, joints, 5.0), (), start)
 
 
 def _spiral(name: str, disturbance: str, *terms: tuple[float, float]) -> TrackingTask:
@@ -262,6 +271,9 @@ def tracking_tasks() -> tuple[TrackingTask, ...]:
         _spiral("fivebar-spiral", "15 N m at 50 and 5 rad/s", (15.0, 50.0), (15.0, 5.0)),
         _spiral("fivebar-spiral-fast", "15 N m at 50 rad/s on both joints", (15.0, 50.0), (15.0, 50.0)),
         _spiral("fivebar-spiral-strong", "100 N m at 50 rad/s on both joints", (100.0, 50.0), (100.0, 50.0)),
+        _stabilisation("stabilise-arm2", "the hanging 2-DoF arm comes to rest from 22.5 degrees", "arm2", 2),
+        _stabilisation("stabilise-arm2-upright", "the same around its upper equilibrium", "arm2-upright", 2),
+        _stabilisation("stabilise-arm3", "the light 3-DoF arm comes to rest from 22.5 degrees", "arm3-light", 3),
     )
 
 
@@ -286,8 +298,9 @@ def build_scenario(
     integrator: IdaIntegrator | Rk4Integrator | None = None,
     external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE,
     transport_delay_s: float = 0.0,
+    initial_angle_rad: Vector | None = None,
 ) -> Scenario:
-    """Return the experiment in which ``robot`` tracks ``trajectory``, starting on it.
+    """Return the experiment in which ``robot`` tracks ``trajectory``.
 
     Args:
         robot: what the controller was designed for.
@@ -298,6 +311,7 @@ def build_scenario(
         integrator: default ``IdaIntegrator()``.
         external_torque: sines on the joints, default (III.53).
         transport_delay_s: time from a sample to the moment its torque acts.
+        initial_angle_rad: start at rest at these angles; default: on the reference, moving with it.
 
     Raises:
         InputError: robot and trajectory do not fit, or a value is out of range.
@@ -306,6 +320,9 @@ def build_scenario(
         raise InputError(trajectory.name, "joints", trajectory.joints, f"{robot.model.joints}, as {robot.id} has")
     arm = robot.with_payload_fraction(1.0 if plant == "perturbed" else 0.0)
     start = trajectory.evaluate(0.0)
+    initial = {"angle_rad": start.angle.tolist(), "speed_rad_s": start.speed.tolist()}
+    if initial_angle_rad is not None:
+        initial = {"angle_rad": list(initial_angle_rad), "speed_rad_s": [0.0] * robot.model.joints}
     document = {
         "schema": "quasilpv.scenario",
         "schema_version": 1,
@@ -316,7 +333,7 @@ def build_scenario(
         "external_torque": [term.model_dump(mode="json") for term in external_torque],
         "sensors": (sensors or Sensors()).model_dump(mode="json"),
         "transport_delay_s": transport_delay_s,
-        "initial": {"angle_rad": start.angle.tolist(), "speed_rad_s": start.speed.tolist()},
+        "initial": initial,
     }
     return Scenario.from_document(document, trajectory.name)
 

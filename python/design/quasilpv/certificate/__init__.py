@@ -20,6 +20,11 @@ from quasilpv.certificate.gate_data import HALF_A_SAMPLE, law_kind
 from quasilpv.certificate.grid_gate import GridGate, grid_gate
 from quasilpv.certificate.hinf_law import check_hinf_tracking
 from quasilpv.certificate.sampled_chains import check_dob_acceleration
+from quasilpv.certificate.stabilising_laws import (
+    check_delayed_feedback,
+    check_descriptor_feedback,
+    check_state_feedback,
+)
 from quasilpv.certificate.torque_law import check_dob_torque
 from quasilpv.errors import InputError
 
@@ -32,6 +37,9 @@ CHECKERS: Mapping[str, tuple[Checker, ...]] = {
     "dob-acceleration": (check_dob_acceleration, check_design_model),
     "dob-torque": (check_dob_torque, check_design_model),
     "hinf-tracking": (check_hinf_tracking, check_design_model),
+    "state-feedback": (check_state_feedback,),
+    "descriptor-feedback": (check_descriptor_feedback, check_design_model),
+    "delayed-feedback": (check_delayed_feedback, check_design_model),
 }
 """How each law kind is checked: its inequalities, then its design model; kinds without an entry make no claim."""
 
@@ -39,6 +47,9 @@ GATES: Mapping[str, Callable[[Mapping[str, Any], str, fmpq], Gate]] = {
     "dob-acceleration": robust_gate,
     "dob-torque": grid_gate,
     "hinf-tracking": grid_gate,
+    "state-feedback": grid_gate,
+    "descriptor-feedback": grid_gate,
+    "delayed-feedback": grid_gate,
 }
 """The robust gate of each law kind: a proof where the loop decouples, a grid elsewhere."""
 

@@ -3,8 +3,8 @@
 An LMI certificate covers the design model in continuous time; it says nothing about a plant of another inertia, about
 sampling, or about delay. With matrix gains the loop of n joints does not decouple into scalar ones, so there is no
 proof like that of the acceleration-level law (`quasilpv.certificate.gate`): the map from one sample to the next is
-rebuilt from the shipped tables at every configuration and payload of a grid, and its spectral radius computed. A grid
-check is no proof, and is reported as none.
+rebuilt from the shipped tables at every configuration and payload of a grid, and its spectral radius computed. Laws
+that do not compensate gravity have it in their loop, as a stiffness. A grid check is no proof, and is reported as none.
 """
 
 from __future__ import annotations
@@ -20,10 +20,13 @@ from quasilpv.certificate.gate_data import HALF_A_SAMPLE, inertia_data, law_kind
 from quasilpv.certificate.gate_inertia import InertiaData
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_range
 from quasilpv.certificate.gate_rationals import to_float
+from quasilpv.certificate.program_values import program_values
+from quasilpv.certificate.stabilisation_model import gravity_stiffness
 from quasilpv.certificate.vertex_tables import VertexTable
 from quasilpv.loops.frozen_loop import FloatArray, FrozenLaw
 from quasilpv.loops.hinf_law import hinf_tracking_law
 from quasilpv.loops.loop_grid import PAYLOAD_FRACTIONS, LoopGrid, WorstLoop, configurations
+from quasilpv.loops.state_law import StateLaw, descriptor_gain
 from quasilpv.loops.torque_law import TorqueLaw
 from quasilpv.loops.velocity_law import VelocityLaw
 
@@ -102,11 +105,16 @@ def grid_gate(document: Mapping[str, Any], source: str = "artifact", delay_sampl
         InputError: a law or a robot this gate does not know, a premise that leaves its box
             on the operating domain, or data that contradict each other.
     """
-    build = FROZEN_LAWS[law_kind(document, source, FROZEN_LAWS)]
+    kind = law_kind(document, source, FROZEN_LAWS)
     data = inertia_data(document, source)
-    pair = InertiaPair(data)
-    angles = configurations(data.angle_rad, every_joint=not data.turns_as_one)
-    plants = LoopGrid(build(document, angles), angles, {f: pair.true_inertia_at(angles, f) for f in PAYLOAD_FRACTIONS})
+    pair, stabilises = InertiaPair(data), kind in STABILISING
+    angles = configurations(data.angle_rad, every_joint=stabilises or not data.turns_as_one)
+    plants = LoopGrid(
+        FROZEN_LAWS[kind](document, angles),
+        angles,
+        {f: pair.true_inertia_at(angles, f) for f in PAYLOAD_FRACTIONS},
+        {f: gravity_stiffness(document, angles, f) for f in PAYLOAD_FRACTIONS} if stabilises else None,
+    )
     delay_s = to_float(delay_samples) * plants.law.sample_period_s
     return GridGate(
         plants=plants,
@@ -177,5 +185,52 @@ def frozen_hinf_law(document: Mapping[str, Any], angles: FloatArray) -> Velocity
     )
 
 
-FROZEN_LAWS: Mapping[str, FrozenLawBuilder] = {"dob-torque": frozen_torque_law, "hinf-tracking": frozen_hinf_law}
+def frozen_stabilising_law(document: Mapping[str, Any], angles: FloatArray) -> StateLaw:
+    """A stabilising law of an artifact at rest at B configurations, (B, n): its window, if any, is filled with them."""
+    law = document["law"]
+    at_rest = list(0.0 * angles.T)
+    premises = np.column_stack(program_values(document["programs"]["schedule"], list(angles.T), at_rest))
+    cosines = _premises_at(inertia_data(document), angles)
+    inertia = VertexTable.parse(law["inertia"]).evaluate(cosines)
+    return StateLaw(
+        float(document["sample_period_s"]),
+        _STABILISING_GAINS[law["kind"]](law, premises, inertia),
+        float(law["velocity_filter_time_constant_s"]),
+    )
+
+
+def _state_gain(law: Mapping[str, Any], premises: FloatArray, inertia: FloatArray) -> FloatArray:
+    return VertexTable.parse(law["gain"]).evaluate(premises)
+
+
+def _descriptor_gain(law: Mapping[str, Any], premises: FloatArray, inertia: FloatArray) -> FloatArray:
+    numerator = VertexTable.parse(law["numerator"]).evaluate(premises)
+    return descriptor_gain(numerator, inertia, np.array(law["lyapunov"], dtype=float))
+
+
+def _delayed_gain(law: Mapping[str, Any], premises: FloatArray, inertia: FloatArray) -> FloatArray:
+    table = VertexTable.parse(law["lyapunov"])
+    weights, P = table.weights(premises), table.evaluate(premises)
+    count = weights.shape[1]
+    cube = np.array(law["numerators"], dtype=float).reshape(count, count, count, *np.shape(law["numerators"][0]))
+    numerator = np.einsum("zj,zk,zm,jkmab->zab", weights, weights, weights, cube)
+    if law["descriptor"]:
+        return descriptor_gain(numerator, inertia, P)
+    return np.asarray(np.linalg.solve(P, numerator.swapaxes(1, 2)).swapaxes(1, 2))
+
+
+_STABILISING_GAINS: Mapping[str, Callable[[Mapping[str, Any], FloatArray, FloatArray], FloatArray]] = {
+    "state-feedback": _state_gain,
+    "descriptor-feedback": _descriptor_gain,
+    "delayed-feedback": _delayed_gain,
+}
+
+STABILISING = tuple(_STABILISING_GAINS)
+"""The law kinds with gravity in their loop."""
+
+FROZEN_LAWS: Mapping[str, FrozenLawBuilder] = {
+    "dob-torque": frozen_torque_law,
+    "hinf-tracking": frozen_hinf_law,
+    **dict.fromkeys(STABILISING, frozen_stabilising_law),
+}
 """How each law kind without a proof is frozen; a new one is one function here."""

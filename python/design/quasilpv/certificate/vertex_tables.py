@@ -70,6 +70,10 @@ class VertexTable:
 
     def evaluate(self, premises: FloatArray) -> FloatArray:
         """``X(z)`` in doubles at B premise vectors, (B, p), clamped to the box as at run time; (B, rows, columns)."""
+        return np.asarray(np.tensordot(self.weights(premises), np.array(self.doubles), axes=1))
+
+    def weights(self, premises: FloatArray) -> FloatArray:
+        """Weights of the vertices in doubles at B premise vectors, (B, p), clamped to the box; (B, N)."""
         low, high = np.array(self.lower), np.array(self.upper)
         share = (np.clip(premises, low, high) - low) / (high - low)
         weights = []
@@ -79,7 +83,7 @@ class VertexTable:
                 upper = share[:, p, None]
                 own = np.stack([own * (1.0 - upper), own * upper], axis=2).reshape(len(share), -1)
             weights.append(own)
-        return np.asarray(np.tensordot(np.concatenate(weights, axis=1), np.array(self.doubles), axes=1))
+        return np.concatenate(weights, axis=1)
 
     def collapse_claim(self, name: str) -> tuple[Claim, ...]:
         """The claim that the collapsed form stays within `COLLAPSE_TOLERANCE`; none if there is no collapsed form."""

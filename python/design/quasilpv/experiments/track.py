@@ -36,12 +36,14 @@ class TrackingExperiment:
         robot: from the registry.
         trajectory: the reference.
         external_torque: sines on the joints.
+        initial_angle_rad: angles of the plant at t = 0, at rest; None to start on the reference.
     """
 
     name: str
     robot: Robot
     trajectory: Trajectory
     external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE
+    initial_angle_rad: tuple[float, ...] | None = None
 
     @classmethod
     def registered(cls, scenario_id: str) -> TrackingExperiment:
@@ -53,7 +55,7 @@ class TrackingExperiment:
         task = tracking_task(scenario_id)
         task_robot = robot(task.robot)
         trajectory = task.trajectory(task_robot.model, task_robot.domain)
-        return cls(task.id, task_robot, trajectory, task.external_torque)
+        return cls(task.id, task_robot, trajectory, task.external_torque, task.initial_angle_rad)
 
     @classmethod
     def from_path_file(cls, path: Path | str, robot_id: str) -> TrackingExperiment:
@@ -100,6 +102,7 @@ def write_run_files(
         plant=plant,
         sensors=sensors,
         external_torque=experiment.external_torque,
+        initial_angle_rad=experiment.initial_angle_rad,
     )
     return RunFiles(
         artifact=write_artifact(folder, artifact)[0],

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from quasilpv.errors import InputError
-from quasilpv.synthesis import baselines, tuned_baselines
+from quasilpv.synthesis import baselines, stabilisation, tuned_baselines
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.acceleration_law import acceleration_law
 from quasilpv.synthesis.hinf_tracking import hinf_tracking
@@ -50,6 +50,19 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
         "H-infinity PI tracking with limited gains (Dehak 2022, Theorem III.10), measured speeds, no feedforward",
         hinf_tracking,
         rate_hz=4000.0,
+    ),
+    "pdc": ControllerKind(
+        "stabilises theta = 0: scheduled state feedback of least gain (Dehak 2022, Theorem I.2), measured speeds",
+        stabilisation.pdc,
+    ),
+    "descriptor": ControllerKind(
+        "stabilises theta = 0: descriptor law of least gain (Dehak 2022, Theorem II.6), measured speeds",
+        stabilisation.descriptor,
+        rate_hz=4000.0,
+    ),
+    "delayed": ControllerKind(
+        "stabilises theta = 0: descriptor law with a moving window (Dehak 2022, Theorem II.8), measured speeds",
+        stabilisation.delayed,
     ),
     "dob-torque": ControllerKind(
         "disturbance-observer tracking at the torque level (Dehak 2022, Theorem IV.11), positions only",

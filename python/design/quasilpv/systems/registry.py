@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import pi
 
@@ -45,7 +45,7 @@ class Robot:
 
 def robots() -> tuple[Robot, ...]:
     """All robots, in a fixed order."""
-    return (_arm2(), _arm3(), _fivebar())
+    return (_arm2(), _arm3(), _arm2_upright(), _arm3_light(), _fivebar())
 
 
 def robot(name: str) -> Robot:
@@ -121,6 +121,38 @@ def _arm3() -> Robot:
         ),
         limits=ActuatorLimits(torque_nm=(1500.0, 1200.0, 700.0), slew_nm_per_s=(1e6, 1e6, 1e6)),
         payloads=PayloadSet(mass_scale=(1.4, 1.4, 2.2), com_scale=(1.4, 1.4, 2.2)),
+    )
+
+
+@lru_cache(maxsize=1)
+def _arm2_upright() -> Robot:
+    """The same arm with its angles counted from the upward vertical: theta = 0 is unstable."""
+    hanging = _arm2()
+    return replace(
+        hanging,
+        id="arm2-upright",
+        summary="arm2 around its upper equilibrium (Dehak 2022, Example I.2 as printed)",
+        model=replace(arm2(), name="arm2-upright", equilibrium="upright"),
+    )
+
+
+@lru_cache(maxsize=1)
+def _arm3_light() -> Robot:
+    """Dehak 2022, Example II.8 with m_3 = 1 kg and |theta_i| <= pi, without payload.
+
+    The moment of inertia of link 3 about its centre of mass is that of arm3; the bound on speeds is a choice of this
+    project.
+    """
+    loaded, model = _arm3(), arm3()
+    *inner, last = model.links
+    light = replace(last, mass_kg=1.0, inertia_kg_m2=last.com_inertia_kg_m2 + last.com_m**2)
+    return replace(
+        loaded,
+        id="arm3-light",
+        summary="arm3 with a last link of 1 kg, over its whole workspace (Dehak 2022, Example II.8)",
+        model=replace(model, name="arm3-light", links=(*inner, light)),
+        domain=OperatingDomain.symmetric(3, angle_rad=pi, speed_rad_s=2.0),
+        payloads=PayloadSet(mass_scale=(1.0, 1.0, 1.0), com_scale=(1.0, 1.0, 1.0)),
     )
 
 

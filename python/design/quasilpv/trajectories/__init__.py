@@ -1,7 +1,7 @@
 """References: task-space paths, the joint-space trajectories planned from them, and their files."""
 
 from quasilpv.trajectories.document import Reference, Trajectory, read_trajectory, write_trajectory
-from quasilpv.trajectories.library import fivebar_spiral, serial_circle, serial_square
+from quasilpv.trajectories.library import fivebar_spiral, rest, serial_circle, serial_square
 from quasilpv.trajectories.paths import TaskPath, read_path
 from quasilpv.trajectories.planning import plan
 
@@ -13,6 +13,7 @@ __all__ = [
     "plan",
     "read_path",
     "read_trajectory",
+    "rest",
     "serial_circle",
     "serial_square",
     "write_trajectory",

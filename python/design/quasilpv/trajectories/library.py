@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.trajectories.document import Trajectory
 from quasilpv.trajectories.paths import ArcSegment, LineSegment, Segment, SpiralSegment, TaskPath
@@ -66,3 +68,8 @@ def fivebar_spiral(robot: Kinematics, domain: OperatingDomain | None = None) -> 
         InputError: as ``plan``.
     """
     return plan(robot, SPIRAL, domain)
+
+
+def rest(name: str, joints: int, duration_s: float) -> Trajectory:
+    """Return the reference theta = 0 for a time, s."""
+    return Trajectory(name, np.array([0.0, duration_s]), np.zeros((1, joints, 6)))

@@ -1,0 +1,78 @@
+"""Programs of an artifact run on numbers of any kind: doubles, arrays, or balls that enclose a range.
+
+The evaluator of the checker, apart from that of the design (``docs/reference/formats.md``, "Programs").
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from flint import arb
+
+Scalar = Any
+Code = Sequence[Sequence[Any]]
+
+_BINARY: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
+    "div": operator.truediv,
+}
+
+
+SINC_RADIUS = 0.01
+"""Wider balls are taken apart: the enclosure of sinc is that of a slope times the radius."""
+
+
+def _sinc(x: Scalar) -> Scalar:
+    if not isinstance(x, arb):
+        return np.sinc(x / np.pi)
+    pieces = math.ceil(float(x.rad()) / SINC_RADIUS)
+    if pieces <= 1:
+        return x.sinc()
+    width = (x.upper() - x.lower()) / pieces
+    parts = [(x.lower() + k * width).union(x.lower() + (k + 1) * width).sinc() for k in range(pieces)]
+    return functools.reduce(arb.union, parts)
+
+
+def _unary(name: str) -> Callable[[Scalar], Scalar]:
+    return lambda x: getattr(x, name)() if isinstance(x, arb) else getattr(np, name)(x)
+
+
+_UNARY: Mapping[str, Callable[[Scalar], Scalar]] = {
+    "neg": operator.neg,
+    "sinc": _sinc,
+    **{name: _unary(name) for name in ("sin", "cos", "exp", "sqrt")},
+}
+
+
+def program_values(program: Mapping[str, Any], angle: Sequence[Scalar], speed: Sequence[Scalar]) -> list[Scalar]:
+    """Outputs of a program at angles and speeds.
+
+    Args:
+        program: of an artifact.
+        angle, speed: n values each, all of one kind: numbers, arrays of one shape, or `flint.arb` balls.
+
+    Raises:
+        KeyError: an operation that no premise of an arm needs (arcs), or a reference.
+    """
+    inputs = {"angle": angle, "speed": speed}
+    stack: list[Scalar] = []
+    for name, *argument in program["code"]:
+        if name == "const":
+            stack.append(0 * angle[0] + float(argument[0]))
+        elif name in inputs:
+            stack.append(inputs[name][int(argument[0])])
+        elif name == "pow_int":
+            stack.append(stack.pop() ** int(argument[0]))
+        elif name in _BINARY:
+            right = stack.pop()
+            stack.append(_BINARY[name](stack.pop(), right))
+        else:
+            stack.append(_UNARY[name](stack.pop()))
+    return stack

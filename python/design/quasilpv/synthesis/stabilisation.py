@@ -1,0 +1,387 @@
+"""Laws that stabilise an arm around theta = 0: the conditions of chapters I to III with the smallest gains.
+
+For a robot with one motor per joint, feasibility alone says nothing: B = [0; I] leaves the gains free to cancel
+everything (`conditions.matched`). What is asked for here is a decay rate and, among the laws that have it, the
+smallest gain: with ``S = diag(I, w I)`` for a rate w that weighs angles against speeds,
+
+    minimise kappa   subject to   the condition,   P > S^2,   |M_j S^-1| < kappa   for the vertices of the numerator
+
+so that ``|K S| < kappa`` for K = M P^-1 (and ``|K S| < kappa |E^-1|`` for the descriptor law). Of the rates tried the
+one of smallest gain is chosen whose frozen sampled loop is stable with every payload and delay.
+
+`pdc` and `descriptor` use all premises of the robot, of angles and measured speeds: where the plant is the nominal one
+their Lyapunov function decreases over the whole operating domain. `delayed` uses the premise of the inertia alone (its
+inequalities grow with the fifth power of the number of vertices) and takes gravity and Coriolis torque as they are at
+rest; what they are beyond that is a disturbance to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from quasilpv.conditions import i2, ii6
+from quasilpv.conditions.condition import Form, Options, Statement, Values
+from quasilpv.conditions.ii8_direct import delayed_design
+from quasilpv.errors import InfeasibleError
+from quasilpv.lmi import Problem, Variable, block
+from quasilpv.loops.loop_grid import PAYLOAD_FRACTIONS, LoopGrid, configurations
+from quasilpv.loops.state_law import StateLaw, descriptor_gain
+from quasilpv.polytopes import BlockPolytope, PolytopicModel
+from quasilpv.synthesis.acceleration_design import Progress
+from quasilpv.synthesis.specification import Specification
+from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
+from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.premise import AffineMatrix, Premise
+from quasilpv.systems.registry import Robot
+
+FloatArray = npt.NDArray[np.float64]
+
+DECAY_PER_S = 1.0
+"""Decay rate of the state; V decreases twice as fast (Dehak 2022, fig. I.2)."""
+
+RATES = (4.0, 8.0)
+"""Weights w of the gain limit, 1/s."""
+
+WINDOW_S = 0.05
+"""Moving window of `delayed`."""
+
+FILTER_SAMPLES = 2.0
+"""Time constant of the speed filter, in samples."""
+
+BACK_OFF = 0.1
+
+BOX_MARGIN = 1e-3
+"""By how much of its width the box of a premise exceeds its range on both sides, so that an enclosure can prove it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One solution: the fields of the law, what its checker needs, its gain, and the law frozen at a configuration.
+
+    Attributes:
+        law: fields of the law kind.
+        witness: matrices by name.
+        gain_limit: kappa.
+        gain: from weights of the vertices (count,) and the design inertia (n, n) to K (n, 2n).
+    """
+
+    law: Mapping[str, Any]
+    witness: Mapping[str, Any]
+    gain_limit: float
+    gain: Callable[[FloatArray, FloatArray], FloatArray]
+
+
+Solver = Callable[[PolytopicModel, float, float], Candidate | None]
+"""From the model, the decay rate and the rate w to a candidate; None if there is no verified solution."""
+
+
+def full_model(robot: Robot) -> PolytopicModel:
+    """The robot around theta = 0 with all its premises, one block each."""
+    system = robot.model.as_descriptor_system(robot.domain)
+    return _per_premise(replace(system, premises=tuple(map(_widened, system.premises))))
+
+
+def inertia_model(robot: Robot) -> PolytopicModel:
+    """The robot with the premise of its inertia only, the torque linearised at rest.
+
+    Raises:
+        InfeasibleError: the inertia has more than one premise.
+    """
+    count = len(robot.model.inertia_premises(robot.domain))
+    if count != 1:
+        raise InfeasibleError(f"{robot.id}: no delayed design: its inertia has {count} premises, expected 1")
+    system = robot.model.as_descriptor_system(robot.domain)
+    at_rest = system.A.evaluate(system.premise_values(np.zeros(system.order)))
+
+    def alone(matrix: AffineMatrix) -> AffineMatrix:
+        return AffineMatrix(matrix.constant, matrix.coefficients[:1])
+
+    return _per_premise(
+        replace(
+            system,
+            premises=(_widened(system.premises[0]),),
+            E=alone(system.E),
+            A=AffineMatrix(at_rest, np.zeros((1, *at_rest.shape))),
+            B=alone(system.B),
+            C=alone(system.C),
+        )
+    )
+
+
+def _per_premise(system: DescriptorSystem) -> PolytopicModel:
+    return PolytopicModel(system, BlockPolytope.per_premise(system.lower, system.upper))
+
+
+def _widened(premise: Premise) -> Premise:
+    margin = BOX_MARGIN * (premise.upper - premise.lower)
+    return replace(premise, bounds=(premise.lower - margin, premise.upper + margin))
+
+
+def _named(problem: Problem, name: str) -> Variable:
+    return next(variable for variable in problem.variables if variable.name == name)
+
+
+def _with_gain_limit(problem: Problem, gains: Sequence[Variable], lyapunov: Sequence[Any], rate: float) -> None:
+    """Add the gain limit of the module's description and minimise it."""
+    kappa, (inputs, size) = Variable("gain limit", 1), (gains[0].rows, gains[0].cols)
+    scale = np.repeat([1.0, rate], size // 2)
+    for k, P in enumerate(lyapunov):
+        problem.positive(f"gain limit: P {k}", P - np.diag(scale**2))
+    for j, gain in enumerate(gains):
+        scaled = (gain @ np.diag(1.0 / scale)).T
+        problem.positive(f"gain limit {j}", block([[kappa * np.eye(inputs), None], [scaled, kappa * np.eye(size)]]))
+    problem.minimise(kappa)
+
+
+def solve_pdc(model: PolytopicModel, decay: float, rate: float) -> Candidate | None:
+    """Theorem I.2 as a single sum with one slack matrix per block; K_j = M_j P_11^-1."""
+    statement = i2.with_gains(model, Options(decay_rate=decay), single=True)
+    problem = statement.problem
+    P11 = _named(problem, "P11")
+    M = [_named(problem, f"M{j}") for j in range(model.vertex_count)]
+    _with_gain_limit(problem, M, [P11], rate)
+    solution = problem.solve_inside(BACK_OFF)
+    if not solution.verified:
+        return None
+    values = solution.values
+    P = _symmetric(values[P11])
+    gains = np.linalg.solve(P, np.stack([values[Mj] for Mj in M]).swapaxes(1, 2)).swapaxes(1, 2)
+    witness = {"P": P, "P21": values[_named(problem, "P21")], "P22": values[_named(problem, "P22")]}
+    return Candidate(
+        law={"kind": "state-feedback", "gain": model.polytope.to_document(gains)},
+        witness=_lists(witness) | {"slack": _slack(statement, values)},
+        gain_limit=solution.objective,
+        gain=lambda weights, inertia: np.asarray(np.tensordot(weights, gains, axes=1)),
+    )
+
+
+def solve_descriptor(model: PolytopicModel, decay: float, rate: float) -> Candidate | None:
+    """Theorem II.6 with common L and R, a single sum with one slack matrix per block."""
+    statement = ii6.build(model, Options(decay_rate=decay, common=True, form=Form.PUBLISHED))
+    problem = statement.problem
+    unknown = _named(problem, "P")
+    F = [_named(problem, f"F{j}") for j in range(model.vertex_count)]
+    _with_gain_limit(problem, F, [unknown], rate)
+    solution = problem.solve_inside(BACK_OFF)
+    if not solution.verified:
+        return None
+    values = solution.values
+    P, numerators = _symmetric(values[unknown]), np.stack([values[Fj] for Fj in F])
+    return Candidate(
+        law={
+            "kind": "descriptor-feedback",
+            "numerator": model.polytope.to_document(numerators),
+            "lyapunov": P.tolist(),
+        },
+        witness=_lists({"L": values[_named(problem, "L")], "R": values[_named(problem, "R")]})
+        | {"slack": _slack(statement, values)},
+        gain_limit=solution.objective,
+        gain=lambda weights, inertia: descriptor_gain(np.tensordot(weights, numerators, axes=1), inertia, P),
+    )
+
+
+def solve_delayed(model: PolytopicModel, decay: float, rate: float) -> Candidate | None:
+    """Theorem II.8 without multipliers, window `WINDOW_S`."""
+    design = delayed_design(model, decay, WINDOW_S)
+    vertices = range(model.vertex_count)
+    F = list(design.F.values())
+    _with_gain_limit(design.problem, F, [design.lyapunov.at(k) for k in vertices], rate)
+    solution = design.problem.solve_inside(BACK_OFF)
+    if not solution.verified:
+        return None
+    P = np.stack([_symmetric(design.lyapunov.at(k).at(solution.values).astype(float)) for k in vertices])
+    numerators = np.stack([solution.values[Fj] for Fj in F])
+    cube = numerators.reshape(*(len(P),) * 3, *numerators.shape[1:])
+
+    def gain(weights: FloatArray, inertia: FloatArray) -> FloatArray:
+        numerator = np.einsum("j,k,m,jkmab->ab", weights, weights, weights, cube)
+        return descriptor_gain(numerator, inertia, np.tensordot(weights, P, axes=1))
+
+    law = {
+        "kind": "delayed-feedback",
+        "lyapunov": model.polytope.to_document(P),
+        "numerators": numerators.tolist(),
+        "descriptor": True,
+    }
+    return Candidate(law, {"window_s": WINDOW_S}, solution.objective, gain)
+
+
+def _slack(statement: Statement, values: Values) -> list[Any]:
+    """The slack of ``He(X) + T``; the inequalities are stated as ``X + T`` with the symmetric part of X."""
+    return [(values[T] + values[T].T).tolist() for T in statement.slacks]
+
+
+def _symmetric(square: FloatArray) -> FloatArray:
+    return np.asarray((square + square.T) / 2.0)
+
+
+def _lists(matrices: Mapping[str, FloatArray]) -> dict[str, Any]:
+    return {name: matrix.tolist() for name, matrix in matrices.items()}
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A stabilising controller: its condition, its model and who solves it."""
+
+    condition: str
+    model: Callable[[Robot], PolytopicModel]
+    solve: Solver
+
+
+_KINDS: Mapping[str, _Kind] = {
+    "pdc": _Kind("I.2", full_model, solve_pdc),
+    "descriptor": _Kind("II.6", full_model, solve_descriptor),
+    "delayed": _Kind("II.8-direct", inertia_model, solve_delayed),
+}
+
+
+def pdc(robot: Robot, specification: Specification, progress: Progress) -> TrackingDesign:
+    """Design `pdc`; see `stabilisation`."""
+    return stabilisation(robot, "pdc", specification, progress)
+
+
+def descriptor(robot: Robot, specification: Specification, progress: Progress) -> TrackingDesign:
+    """Design `descriptor`; see `stabilisation`."""
+    return stabilisation(robot, "descriptor", specification, progress)
+
+
+def delayed(robot: Robot, specification: Specification, progress: Progress) -> TrackingDesign:
+    """Design `delayed`; see `stabilisation`."""
+    return stabilisation(robot, "delayed", specification, progress)
+
+
+def stabilisation(
+    robot: Robot,
+    controller: str,
+    specification: Specification,
+    progress: Progress,
+    *,
+    decay_per_s: float = DECAY_PER_S,
+    rates: Sequence[float] = RATES,
+) -> TrackingDesign:
+    """Design a law that stabilises theta = 0.
+
+    Args:
+        robot: its operating domain contains theta = 0.
+        controller: ``pdc``, ``descriptor`` or ``delayed``.
+        specification: sample rate, and the delay its frozen loop has to tolerate.
+        progress: called with (rates done, rates in all).
+        decay_per_s: alpha > 0, of the state.
+        rates: weights w of the gain limit to try, 1/s.
+
+    Raises:
+        InfeasibleError: the operating domain does not contain theta = 0, the inequalities have no verified solution,
+            or no rate gives a frozen sampled loop that is stable with every payload and delay.
+    """
+    if any(not low < 0.0 < high for low, high in robot.domain.angle_rad):
+        raise InfeasibleError(f"{robot.id}: no {controller} design: its operating domain does not contain theta = 0")
+    kind = _KINDS[controller]
+    model = kind.model(robot)
+    found = []
+    for done, rate in enumerate(rates, start=1):
+        candidate = kind.solve(model, decay_per_s, rate)
+        if candidate is not None:
+            found.append((candidate.gain_limit, rate, candidate))
+        progress(done, len(rates))
+    for _, rate, candidate in sorted(found, key=lambda entry: entry[0]):
+        growth = dict(_growth_rates(robot, specification, model, candidate))
+        if max(growth.values()) < 0.0:
+            report = _report(robot, kind, model, candidate) | {
+                "decay_per_s": decay_per_s,
+                "rate_per_s": rate,
+                "worst_growth_rate_per_s": max(growth.values()),
+                "growth_rates_per_s": growth,
+            }
+            return _design(robot, controller, specification, candidate, model=model, report=report)
+    raise InfeasibleError(
+        f"{robot.id}: no {controller} design at {specification.rate_hz:g} Hz: of {len(found)} solutions with decay "
+        f"rate {decay_per_s:g} 1/s none is stable with every payload and {specification.delay_s:g} s delay"
+    )
+
+
+def _growth_rates(
+    robot: Robot, specification: Specification, model: PolytopicModel, candidate: Candidate
+) -> Iterator[tuple[str, float]]:
+    """Worst growth rate of the frozen sampled loops, 1/s, without delay and with the specified one."""
+    angles = configurations(robot.domain.angle_rad, every_joint=True)
+    nominal = np.array([robot.model.inertia(theta) for theta in angles])
+    weights = [_weights_at_rest(model, theta) for theta in angles]
+    law = StateLaw(
+        specification.sample_period_s,
+        np.array([candidate.gain(w, M) for w, M in zip(weights, nominal, strict=True)]),
+        FILTER_SAMPLES * specification.sample_period_s,
+    )
+    plants = {fraction: robot.with_payload_fraction(fraction) for fraction in PAYLOAD_FRACTIONS}
+    grid = LoopGrid(
+        law,
+        angles,
+        {f: np.array([plant.inertia(theta) for theta in angles]) for f, plant in plants.items()},
+        {f: np.array([plant.gravity_stiffness(theta) for theta in angles]) for f, plant in plants.items()},
+    )
+    for case, delay_s in (("no_delay", 0.0), ("specified_delay", specification.delay_s)):
+        yield case, grid.worst(delay_s=delay_s).growth_rate_per_s
+
+
+def _weights_at_rest(model: PolytopicModel, theta: FloatArray) -> FloatArray:
+    premises = model.system.premise_values(np.concatenate([theta, np.zeros(len(theta))]))
+    return model.polytope.weights(model.polytope.saturate(premises)[0])
+
+
+def _report(robot: Robot, kind: _Kind, model: PolytopicModel, candidate: Candidate) -> dict[str, Any]:
+    """The numbers a person asks for, JSON-able, but for those of the loop."""
+    at_rest = np.zeros(robot.model.joints)
+    gain = candidate.gain(_weights_at_rest(model, at_rest), robot.model.inertia(at_rest))
+    proportional, derivative = np.split(gain, 2, axis=1)
+    return {
+        "condition": kind.condition,
+        "scheduled_premises": [str(premise.expression) for premise in model.system.premises],
+        "vertices": model.vertex_count,
+        "gain_limit": candidate.gain_limit,
+        "largest_gains_at_rest": {
+            "proportional": float(np.abs(proportional).max()),
+            "derivative": float(np.abs(derivative).max()),
+        },
+    }
+
+
+def _design(
+    robot: Robot,
+    controller: str,
+    specification: Specification,
+    candidate: Candidate,
+    *,
+    model: PolytopicModel,
+    report: Mapping[str, Any],
+) -> TrackingDesign:
+    """What is shipped."""
+    system, polytope, T = model.system, model.polytope, specification.sample_period_s
+    tables = {name: polytope.vertices(X.constant, X.coefficients) for name, X in (("E", system.E), ("A", system.A))}
+    law = {**candidate.law, "velocity_filter_time_constant_s": FILTER_SAMPLES * T, "inertia": inertia_table(robot)}
+    if law["kind"] == "delayed-feedback":
+        law["window_samples"] = round(WINDOW_S / T)
+    asked = {name: report[name] for name in ("decay_per_s", "rate_per_s")}
+    return TrackingDesign(
+        controller=controller,
+        robot=robot,
+        sample_period_s=T,
+        law=law,
+        expressions={
+            **premise_and_gravity(robot),
+            "schedule": tuple(premise.expression for premise in system.premises),
+        },
+        inputs={"controller": controller, "specification": specification.to_document(), **asked},
+        report=report,
+        witness={
+            "feedback": {
+                "condition": report["condition"],
+                "decay_per_s": report["decay_per_s"],
+                "model": {name: polytope.to_document(vertices) for name, vertices in tables.items()},
+                **candidate.witness,
+            }
+        },
+    )
