@@ -144,9 +144,9 @@ def test_closed_linkage_moves_as_pinocchio_says(
     expected = np.linalg.solve(to_relative, relative)
     scale = np.abs(expected).max() + np.abs(rate).max() ** 2
     acceleration, multipliers = linkage.constrained_dynamics(phi, rate, torque)
-    assert_allclose(acceleration, expected, atol=1e-9 * scale)
+    assert_allclose(acceleration, expected, atol=1e-10 * scale)
     M, bias, G = linkage.reduced_dynamics(theta, omega)
-    assert_allclose(np.linalg.solve(M, torque - bias - G), expected[:2], atol=1e-9 * scale)
+    assert_allclose(np.linalg.solve(M, torque - bias - G), expected[:2], atol=1e-10 * scale)
     load = linkage.mass_matrix(phi) @ acceleration + linkage.speed_torque(phi, rate) + linkage.gravity_torque(phi)
     balance = load - linkage.closure_jacobian(phi).T @ multipliers - np.concatenate([torque, [0.0, 0.0]])
     assert_allclose(balance, 0.0, atol=1e-9 * (1 + np.abs(load).max()))
