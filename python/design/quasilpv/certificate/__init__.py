@@ -37,7 +37,7 @@ CHECKERS: Mapping[str, tuple[Checker, ...]] = {
     "dob-acceleration": (check_dob_acceleration, check_design_model),
     "dob-torque": (check_dob_torque, check_design_model),
     "hinf-tracking": (check_hinf_tracking, check_design_model),
-    "state-feedback": (check_state_feedback,),
+    "state-feedback": (check_state_feedback, check_design_model),
     "descriptor-feedback": (check_descriptor_feedback, check_design_model),
     "delayed-feedback": (check_delayed_feedback, check_design_model),
 }

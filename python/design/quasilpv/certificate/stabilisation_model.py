@@ -59,7 +59,10 @@ def _outputs(program: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 def _premise_claim(
     index: int, program: Mapping[str, Any], domain: Sequence[Sequence[float]], box: tuple[float, float]
 ) -> Claim:
-    """Subdivide the domain until every piece is seen to stay inside the box; only inputs that occur are divided."""
+    """Subdivide the domain until every piece is seen to stay inside the box, or the middle of one to be outside.
+
+    Only inputs that occur are divided.
+    """
     used = sorted(
         {int(op[1]) + (len(domain) // 2 if op[0] == "speed" else 0) for op in program["code"] if op[0] in _INPUTS}
     )
@@ -72,6 +75,9 @@ def _premise_claim(
         value = _enclosure(program, piece)
         if value.lower() >= box[0] and value.upper() <= box[1]:
             continue
+        middle = _enclosure(program, [((low + high) / 2.0,) * 2 for low, high in piece])
+        if middle.upper() < box[0] or middle.lower() > box[1]:
+            break
         widths = {k: (piece[k][1] - piece[k][0]) / (domain[k][1] - domain[k][0]) for k in used}
         widest = max(widths, key=lambda k: widths[k])
         low, high = piece[widest]
