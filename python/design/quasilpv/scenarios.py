@@ -9,7 +9,6 @@ carries white noise.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from quasilpv.artifact.canonical import MAX_SAFE_INTEGER, Document, member_path, normalise, parse_strict_json
-from quasilpv.artifact.files import read_bytes, write_atomically
+from quasilpv.artifact.files import read_bytes, write_readable_json
 from quasilpv.artifact.programs import MAX_JOINTS
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError
@@ -345,7 +344,7 @@ def write_scenario(path: Path | str, scenario: Scenario) -> Path:
         InputError: the file cannot be written; nothing half-written is left behind.
     """
     path = Path(path)
-    write_atomically({path: (json.dumps(scenario.to_document(), indent=2) + "\n").encode()})
+    write_readable_json(path, scenario.to_document())
     return path
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 from collections.abc import Mapping
@@ -26,6 +27,20 @@ def read_bytes(path: Path | str) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InputError(str(path), "file", error.strerror or error, "a readable file") from error
+
+
+def readable_json(value: object) -> str:
+    """A JSON-able tree as indented text for people, without final newline; numbers in their shortest round-trip form.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    return json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False)
+
+
+def write_readable_json(path: Path, value: object) -> None:
+    """Write a JSON-able tree, indented, with a final newline, whole or not at all. Errors as `write_atomically`."""
+    write_atomically({path: f"{readable_json(value)}\n".encode()})
 
 
 def write_atomically(contents: Mapping[Path, bytes]) -> None:

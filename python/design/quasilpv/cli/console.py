@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,19 +12,16 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from quasilpv.artifact.files import readable_json
+
 JsonOption: TypeAlias = Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else there.")]
 
 WIDTH_WITHOUT_TERMINAL = 160
 
 
-def to_json(value: Any) -> str:
-    """A JSON-able tree as indented text; numbers in their shortest round-trip form."""
-    return json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False)
-
-
 def print_json(value: Any) -> None:
     """Print a JSON-able tree on stdout."""
-    print(to_json(value))
+    print(readable_json(value))
 
 
 def print_note(message: str) -> None:
@@ -67,9 +63,7 @@ class Steps:
 
     def parts(self, done: int, total: int) -> None:
         """Say how far the current step is: a callback for long computations."""
-        self._progress.update(
-            self._parts, description="design search", completed=done, total=total, visible=done < total
-        )
+        self._progress.update(self._parts, description="evaluations", completed=done, total=total, visible=done < total)
 
     def end(self) -> None:
         """Count the step that has ended."""

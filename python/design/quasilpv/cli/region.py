@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json as json_text
 import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from quasilpv.artifact.files import write_atomically
+from quasilpv.artifact.files import write_readable_json
 from quasilpv.cli.console import JsonOption, print_json, print_note, progress
 from quasilpv.cli.parameters import (
     CommonOption,
@@ -93,5 +92,5 @@ def region_command(
 def _write(region: Region, out: Path) -> list[Path]:
     stem = out / f"{region.question.system}-{region.question.condition}-{region.x.name}-{region.y.name}"
     document = stem.with_name(stem.name + ".json")
-    write_atomically({document: json_text.dumps(region.to_document(), indent=2, allow_nan=False).encode()})
+    write_readable_json(document, region.to_document())
     return [document, *save(region_figure([region]), stem)]

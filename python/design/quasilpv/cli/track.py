@@ -10,8 +10,8 @@ from typing import Annotated, cast
 import typer
 
 from quasilpv.artifact import Artifact, read_artifact
-from quasilpv.artifact.files import write_atomically
-from quasilpv.cli.console import JsonOption, Steps, print_json, print_note, progress, to_json
+from quasilpv.artifact.files import write_readable_json
+from quasilpv.cli.console import JsonOption, Steps, print_json, print_note, progress
 from quasilpv.cli.options import (
     ArtifactOption,
     EncoderOption,
@@ -115,7 +115,7 @@ def track_command(
                 steps.begin(f"{experiment.name}: {variant.label}")
                 results.append(session.run(experiment, variant, steps))
                 steps.end()
-    write_atomically({out / "results.json": to_json([result.row() for result in results]).encode()})
+    write_readable_json(out / "results.json", [result.row() for result in results])
     if not json if figures is None else figures:
         _draw(results, out)
     if json:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from quasilpv.artifact.files import write_atomically
+from quasilpv.artifact.files import write_atomically, write_readable_json
 from quasilpv.errors import InputError
 from quasilpv.figures.style import save
 from quasilpv.reproduction.item import Effort, Item, ItemResult
@@ -51,7 +51,7 @@ def reproduce(
         row = _kept(out / f"{one.id}.json", effort, code)
         if row is None:
             row = {**_computed(one, effort, out), "effort": effort.value, "code": code}
-            write_atomically({out / f"{one.id}.json": _text(row)})
+            write_readable_json(out / f"{one.id}.json", row)
         rows.append(row)
         _write_results(out, rows, code)
         end()
@@ -71,7 +71,8 @@ def _write_results(out: Path, rows: Sequence[Mapping[str, Any]], code: str) -> N
     """Rows of earlier runs of the same code, replaced by or followed by those of this one."""
     known = {row["id"]: row for row in [*_rows(out / RESULTS), *rows] if row["code"] == code}
     merged = list(known.values())
-    write_atomically({out / RESULTS: _text(merged), out / REPORT: markdown_table(merged).encode()})
+    write_readable_json(out / RESULTS, merged)
+    write_atomically({out / REPORT: markdown_table(merged).encode()})
 
 
 def _kept(path: Path, effort: Effort, code: str) -> Mapping[str, Any] | None:
@@ -102,7 +103,3 @@ def _code_digest() -> str:
     for path in sorted(root.rglob("*.py")):
         digest.update(f"{path.relative_to(root)}\0".encode() + path.read_bytes() + b"\0")
     return digest.hexdigest()
-
-
-def _text(value: Any) -> bytes:
-    return (json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False) + "\n").encode()
