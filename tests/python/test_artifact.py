@@ -13,8 +13,9 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quasilpv.artifact import Artifact, compile_program, diff, evaluate, read_artifact, summary, write_artifact
+from quasilpv.artifact import Artifact, diff, evaluate, read_artifact, summary, write_artifact
 from quasilpv.artifact.canonical import canonical_cbor, canonical_json, parse_document, with_hash
+from quasilpv.artifact.compilation import compile_program
 from quasilpv.artifact.schema import REQUIRED_PROGRAMS
 from quasilpv.artifact.tables import PolytopeTable
 from quasilpv.errors import InputError

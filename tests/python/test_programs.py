@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from quasilpv.artifact.programs import MAX_LENGTH, MAX_STACK, OPERATIONS, Program, compile_program, evaluate
+from quasilpv.artifact.compilation import compile_program
+from quasilpv.artifact.programs import MAX_LENGTH, MAX_STACK, OPERATIONS, Program, evaluate
 from quasilpv.errors import InputError
 
 THETA = sp.symbols("theta_1:4", real=True)

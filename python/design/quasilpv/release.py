@@ -14,8 +14,9 @@ import sympy as sp
 from flint import fmpq
 
 from quasilpv import __version__
-from quasilpv.artifact import Artifact, Program, compile_program
+from quasilpv.artifact import Artifact, Program
 from quasilpv.artifact.canonical import document_hash
+from quasilpv.artifact.compilation import compile_program
 from quasilpv.certificate import CHECKERS, gate, verify
 from quasilpv.errors import ClaimError
 from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, TrackingDesign, synthesise

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from quasilpv.artifact import compile_program
 from quasilpv.artifact.canonical import canonical_json, with_hash
+from quasilpv.artifact.compilation import compile_program
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.systems.arm_parameters import Link as ArmLink
 from quasilpv.systems.arms import PlanarSerialArm

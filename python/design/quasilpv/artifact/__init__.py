@@ -1,6 +1,6 @@
 """Artifacts: the controller as one canonical, hashed document that the run-time side loads."""
 
-from quasilpv.artifact.programs import Program, compile_program, evaluate
+from quasilpv.artifact.programs import Program, evaluate
 from quasilpv.artifact.schema import Artifact
 from quasilpv.artifact.store import Difference, diff, read_artifact, summary, write_artifact
 
@@ -8,7 +8,6 @@ __all__ = [
     "Artifact",
     "Difference",
     "Program",
-    "compile_program",
     "diff",
     "evaluate",
     "read_artifact",

@@ -1,0 +1,135 @@
+"""From sympy expressions to programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import sympy
+from sympy.core.sorting import default_sort_key
+
+from quasilpv.artifact.programs import MAX_LENGTH, MAX_POWER, MAX_STACK, OPERATIONS, Program
+from quasilpv.errors import InputError
+
+Instruction = tuple[str] | tuple[str, int] | tuple[str, float]
+
+
+def compile_program(expressions: Sequence[sympy.Expr], inputs: Mapping[sympy.Symbol, tuple[str, int]]) -> Program:
+    """Compile sympy expressions to one program with ``len(expressions)`` outputs.
+
+    Sums and products are evaluated from left to right in sympy's canonical sort order, so that equal expressions give
+    equal code on every machine. ``sympy.sinc`` is sin(x)/x, as in the programs; tan and atan are written with the
+    operations there are.
+
+    Args:
+        expressions: real expressions in the keys of ``inputs``.
+        inputs: where each symbol is read from, e.g. ``{theta_1: ("angle", 0)}``.
+
+    Raises:
+        InputError: an unknown symbol, a function outside the closed list, a number that is not a finite real, or code
+            that is too long or needs too deep a stack.
+    """
+    code: list[Instruction] = []
+    for i, expression in enumerate(expressions):
+        _Compiler(inputs, f"output {i}", code).emit(sympy.sympify(expression))
+    if len(code) > MAX_LENGTH:
+        raise InputError("program", "code", f"{len(code)} instructions", f"at most {MAX_LENGTH}")
+    try:
+        return Program(outputs=len(expressions), code=tuple(code))
+    except ValueError as error:
+        raise InputError("program", "code", error, f"a stack of at most {MAX_STACK} values") from error
+
+
+class _Compiler:
+    """Emits the postfix code of one expression tree."""
+
+    _FUNCTIONS: Mapping[Any, str] = {
+        sympy.sin: "sin",
+        sympy.cos: "cos",
+        sympy.asin: "asin",
+        sympy.acos: "acos",
+        sympy.exp: "exp",
+        sympy.sinc: "sinc",
+        sympy.atan2: "atan2",
+    }
+
+    def __init__(self, inputs: Mapping[sympy.Symbol, tuple[str, int]], field: str, code: list[Instruction]) -> None:
+        self._inputs = inputs
+        self._field = field
+        self._code = code
+
+    def emit(self, node: sympy.Expr) -> None:
+        if node in self._inputs:
+            self._code.append(self._inputs[node])
+        elif node.is_number:
+            self._code.append(("const", self._number(node)))
+        elif node.is_Add:
+            self._emit_sum(node)
+        elif node.is_Mul:
+            self._emit_product(node)
+        elif node.is_Pow:
+            self._emit_power(node.base, node.exp)
+        elif node.func in self._FUNCTIONS:
+            for argument in node.args:
+                self.emit(argument)
+            self._code.append((self._FUNCTIONS[node.func],))
+        elif node.func is sympy.tan:
+            self.emit(sympy.sin(node.args[0]))
+            self.emit(sympy.cos(node.args[0]))
+            self._code.append(("div",))
+        elif node.func is sympy.atan:
+            self.emit(node.args[0])
+            self._code.extend([("const", 1.0), ("atan2",)])
+        else:
+            known = map(str, self._inputs) if node.is_Symbol else OPERATIONS
+            raise InputError("program", self._field, node, f"one of {', '.join(known)}")
+
+    def _number(self, node: sympy.Expr) -> float:
+        if node.is_real is False or not np.isfinite(value := float(node)):
+            raise InputError("program", self._field, node, "a finite real number")
+        return value
+
+    def _emit_sum(self, node: sympy.Expr) -> None:
+        first, *rest = sorted(node.args, key=lambda term: (term.could_extract_minus_sign(), default_sort_key(term)))
+        self.emit(first)
+        for term in rest:
+            negative = term.could_extract_minus_sign()
+            self.emit(-term if negative else term)
+            self._code.append(("sub",) if negative else ("add",))
+
+    def _emit_product(self, node: sympy.Expr) -> None:
+        if node.could_extract_minus_sign():
+            self.emit(-node)
+            self._code.append(("neg",))
+            return
+        numerator: list[sympy.Expr] = []
+        denominator: list[sympy.Expr] = []
+        for factor in sorted(node.args, key=default_sort_key):
+            inverted = factor.is_Pow and factor.exp.could_extract_minus_sign()
+            (denominator if inverted else numerator).append(1 / factor if inverted else factor)
+        self._emit_factors(numerator or [sympy.Integer(1)])
+        if denominator:
+            self._emit_factors(denominator)
+            self._code.append(("div",))
+
+    def _emit_factors(self, factors: Sequence[sympy.Expr]) -> None:
+        self.emit(factors[0])
+        for factor in factors[1:]:
+            self.emit(factor)
+            self._code.append(("mul",))
+
+    def _emit_power(self, base: sympy.Expr, exponent: sympy.Expr) -> None:
+        if exponent.could_extract_minus_sign():
+            self._code.append(("const", 1.0))
+            self.emit(base**-exponent)
+            self._code.append(("div",))
+        elif exponent == sympy.Rational(1, 2):
+            self.emit(base)
+            self._code.append(("sqrt",))
+        elif exponent.is_Integer and int(exponent) <= MAX_POWER:
+            self.emit(base)
+            self._code.append(("pow_int", int(exponent)))
+        else:
+            expected = f"an integer power of at most {MAX_POWER} in absolute value, or a square root"
+            raise InputError("program", self._field, base**exponent, expected)
