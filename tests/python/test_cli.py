@@ -17,9 +17,10 @@ import pytest
 from quasilpv.artifact import Artifact, read_artifact
 from quasilpv.artifact.canonical import canonical_json, parse_document, with_hash
 from quasilpv.cli import run
+from quasilpv.cli.verbs import VERBS
 from quasilpv.experiments.result import Variant
 
-VERBS = ("list", "synth", "inspect", "verify", "robust", "track", "hil")
+HEAVY = ("sympy", "matplotlib", "scipy", "clarabel", "cvxpy", "joblib")
 ROW = {
     "scenario": str,
     "controller": str,
@@ -91,8 +92,8 @@ def test_when_called_alone_expect_an_explanation_with_examples(design: Design) -
     outcome = design()
     assert (outcome.code, outcome.err) == (0, "")
     assert outcome.out == design("--help").out
-    for verb in VERBS:
-        assert f"design {verb}" in outcome.out
+    for name, verb in VERBS.items():
+        assert f"  {name:<11} {verb.summary}\n" in outcome.out
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -100,6 +101,18 @@ def test_when_help_is_asked_for_expect_an_example_on_a_line_of_its_own(design: D
     outcome = design(verb, "--help")
     assert outcome.code == 0
     assert any(line.strip().startswith(f"design {verb}") for line in outcome.out.splitlines())
+
+
+@pytest.mark.parametrize("verb", ["", "verify", "inspect"])
+def test_when_no_design_is_made_expect_neither_algebra_nor_solvers_nor_plotting_loaded(verb: str) -> None:
+    program = f"""
+import sys
+from quasilpv.cli import run
+assert run([*{verb.split()!r}, "--help"]) == 0
+print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr == "[]\n"
 
 
 def test_when_listed_as_json_expect_robots_controllers_and_scenarios(design: Design) -> None:

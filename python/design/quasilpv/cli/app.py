@@ -9,21 +9,7 @@ from collections.abc import Sequence
 import typer
 
 from quasilpv import __version__
-from quasilpv.cli import (
-    boundary,
-    complexity,
-    export_sdp,
-    hil,
-    inspect,
-    listing,
-    region,
-    reproduce,
-    robust,
-    solve,
-    synth,
-    track,
-    verify,
-)
+from quasilpv.cli.verbs import VerbGroup
 from quasilpv.errors import (
     ClaimError,
     FaultStop,
@@ -69,6 +55,7 @@ Exit codes:
 
 app = typer.Typer(
     name="design",
+    cls=VerbGroup,
     help=HELP,
     no_args_is_help=False,
     add_completion=False,
@@ -91,21 +78,6 @@ def _root(
 ) -> None:
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
-
-
-app.command("list")(listing.list_command)
-app.command("synth")(synth.synth_command)
-app.command("inspect")(inspect.inspect_command)
-app.command("verify")(verify.verify_command)
-app.command("robust")(robust.robust_command)
-app.command("export-sdp")(export_sdp.export_sdp_command)
-app.command("track")(track.track_command)
-app.command("hil")(hil.hil_command)
-app.command("solve")(solve.solve_command)
-app.command("boundary")(boundary.boundary_command)
-app.command("region")(region.region_command)
-app.command("complexity")(complexity.complexity_command)
-app.command("reproduce")(reproduce.reproduce_command)
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -13,7 +13,7 @@ from quasilpv.systems.catalogue import SYSTEMS
 from quasilpv.systems.registry import robots
 
 
-def list_command(json: JsonOption = False) -> None:
+def listing_command(json: JsonOption = False) -> None:
     """List robots, controllers, scenarios, systems, conditions and items of design reproduce.
 
     \b

@@ -1,0 +1,80 @@
+"""The verbs of the command, each imported only when it is called.
+
+Most verbs need libraries that take a second to load: symbolic algebra, solvers, plotting. The table below is all that
+help and error messages need of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+
+@dataclass(frozen=True)
+class Verb:
+    """A verb of the command.
+
+    Attributes:
+        module: of `quasilpv.cli`; it holds one function, ``<module>_command``.
+        summary: what the list of verbs says of it; its own help is the function's docstring.
+    """
+
+    module: str
+    summary: str
+
+    def load(self, name: str) -> TyperCommand:
+        """Import the verb and build its command."""
+        function = getattr(import_module(f"quasilpv.cli.{self.module}"), f"{self.module}_command")
+        alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+        alone.command(name)(function)
+        command = typer.main.get_command(alone)
+        assert isinstance(command, TyperCommand)
+        return command
+
+
+VERBS: Mapping[str, Verb] = {
+    "list": Verb("listing", "What there is: robots, controllers, scenarios, conditions."),
+    "synth": Verb("synth", "Design a controller and write its artifact."),
+    "inspect": Verb("inspect", "What is in an artifact."),
+    "verify": Verb("verify", "Every inequality of an artifact, in exact arithmetic."),
+    "robust": Verb("robust", "The robust gate: every posture, payload, small delay."),
+    "export-sdp": Verb("export_sdp", "The semidefinite program behind a law, as a file."),
+    "track": Verb("track", "Scenarios in closed loop: table and figures."),
+    "hil": Verb("hil", "Controller and plant as two processes over LCM."),
+    "solve": Verb("solve", "Whether a condition holds for a system."),
+    "boundary": Verb("boundary", "Where a condition stops being feasible."),
+    "region": Verb("region", "A map of feasibility over two parameters."),
+    "complexity": Verb("complexity", "How large conditions are."),
+    "reproduce": Verb("reproduce", "Figures and tables of the source, with verdicts."),
+}
+
+
+class _Commands(Mapping[str, TyperCommand]):
+    """`VERBS` as the commands of a group: the names are known, the commands made on demand."""
+
+    def __getitem__(self, name: str) -> TyperCommand:
+        return VERBS[name].load(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(VERBS)
+
+    def __len__(self) -> int:
+        return len(VERBS)
+
+
+class VerbGroup(TyperGroup):
+    """A group whose commands are `VERBS`."""
+
+    def __init__(self, **attributes: Any) -> None:
+        """Take what typer gives a group, except commands."""
+        super().__init__(**{**attributes, "commands": _Commands()})
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """List the verbs without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, verb.summary) for name, verb in VERBS.items()])
