@@ -226,6 +226,12 @@ class TestCommands:
         assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png", ".svg", ".jsonl"}
         assert len(document["points"]) == 9
 
+    def test_maps_of_different_questions_lie_beside_each_other(self, tmp_path: Path) -> None:
+        axes = ("--x", "a=-2:6:2", "--y", "b=-4:8:2", "--grid", "-j", "1", "-o", str(tmp_path))
+        for options in ((), ("--representation", "ts"), ("--slack", "full")):
+            assert self.design("region", "ex-I.1", "-c", "II.6", *axes, *options).returncode == 0
+        assert len(list(tmp_path.glob("ex-I.1-II.6-*.json"))) == 3
+
     @pytest.mark.parametrize(
         ("arguments", "words"),
         [
@@ -236,6 +242,7 @@ class TestCommands:
             (("boundary", "ex-I.1", "-c", "II.6", "--over", "b=0"), "NAME=FROM:TO"),
             (("boundary", "ex-I.1", "-c", "II.6", "--over", "b=0:1", "--tolerance", "2"), "tolerance"),
             (("region", "ex-I.1", "-c", "II.6", "--x", "a=0:1:2.5", "--y", "b=0:1:2"), "whole number"),
+            (("region", "ex-I.1", "-c", "II.6", "--x", "a=0:1:2", "--y", "b=0:1:2", "-j", "0"), "--processes"),
             (("complexity", "ex-I.9", "-c", "II.6"), "ex-I.1"),
             (("solve", "arm3", "-c", "II.5", "--representation", "ts"), "fewer vertices"),
             (("solve", "ex-I.1", "-c", "II.8", "--window-s", "0"), "window"),

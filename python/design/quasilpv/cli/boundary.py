@@ -7,39 +7,17 @@ from typing import Annotated
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json
-from quasilpv.cli.parameters import (
-    CommonOption,
-    ConditionOption,
-    DecayOption,
-    FormOption,
-    RepresentationOption,
-    SampleOption,
-    SetOption,
-    SlackOption,
-    SystemArgument,
-    WindowOption,
-    interval,
-    question,
-)
-from quasilpv.conditions.blocks import Slack
-from quasilpv.conditions.condition import Form, Options
+from quasilpv.cli.parameters import asks_one_question, interval
 from quasilpv.studies import find_boundary
 from quasilpv.studies.boundary import RELATIVE_TOLERANCE
+from quasilpv.studies.question import Question
 
 
+@asks_one_question
 def boundary_command(
-    system: SystemArgument,
+    asked: Question,
     *,
-    condition: ConditionOption,
     over: Annotated[str, typer.Option("--over", metavar="NAME=FROM:TO", help="The parameter and its range.")],
-    representation: RepresentationOption = "",
-    slack: SlackOption = Slack.THESIS,
-    parameters: SetOption = None,
-    decay: DecayOption = 0.0,
-    form: FormOption = Form.REDUCED,
-    common: CommonOption = False,
-    window_s: WindowOption = None,
-    sample_period_s: SampleOption = Options.sample_period_s,
     tolerance: Annotated[float, typer.Option("--tolerance", help="Relative width to stop at.")] = RELATIVE_TOLERANCE,
     json: JsonOption = False,
 ) -> int:
@@ -51,9 +29,8 @@ def boundary_command(
     Example:
       design boundary ex-I.1 --condition II.6 --set a=1 --over b=0:30
     """
-    options = Options(slack, decay, form, window_s=window_s, common=common, sample_period_s=sample_period_s)
     searched = interval(over, "--over")
-    found = find_boundary(question(system, condition, representation, parameters, options), searched, tolerance)
+    found = find_boundary(asked, searched, tolerance)
     if json:
         print_json(found.to_document())
     elif found.certified_up_to is None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, TypeAlias
+import inspect
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Annotated, Any, TypeAlias, TypeVar
 
 import typer
 
@@ -14,6 +16,8 @@ from quasilpv.polytopes.representation import REPRESENTATIONS
 from quasilpv.studies.boundary import Interval
 from quasilpv.studies.question import Question
 from quasilpv.studies.region import Axis
+
+Result = TypeVar("Result")
 
 SystemArgument: TypeAlias = Annotated[str, typer.Argument(metavar="SYSTEM", help="A system of design list.")]
 ConditionOption: TypeAlias = Annotated[str, typer.Option("--condition", "-c", help="A condition of design list.")]
@@ -35,8 +39,6 @@ DecayOption: TypeAlias = Annotated[float, typer.Option("--decay", help="Decay ra
 FormOption: TypeAlias = Annotated[
     Form, typer.Option("--form", help="As published, or reduced: equivalent and smaller where a proof allows it.")
 ]
-
-
 CommonOption: TypeAlias = Annotated[
     bool, typer.Option("--common", help="Multipliers without index: fewer unknowns, more conservative.")
 ]
@@ -63,6 +65,47 @@ def question(
     """
     values = tuple(_named_number(text) for text in settings or ())
     return Question(system, condition, representation, values, options)
+
+
+def _stated(
+    system: SystemArgument,
+    *,
+    condition: ConditionOption,
+    representation: RepresentationOption = "",
+    slack: SlackOption = Slack.THESIS,
+    parameters: SetOption = None,
+    decay: DecayOption = 0.0,
+    form: FormOption = Form.REDUCED,
+    common: CommonOption = False,
+    window_s: WindowOption = None,
+    sample_period_s: SampleOption = Options.sample_period_s,
+) -> Question:
+    """The question of one condition; its parameters are the options of every verb that asks one."""
+    options = Options(slack, decay, form, window_s=window_s, common=common, sample_period_s=sample_period_s)
+    return question(system, condition, representation, parameters, options)
+
+
+def asks_one_question(verb: Callable[..., Result]) -> Callable[..., Result]:
+    """Make a verb of a function of a question: the options that state the question come before its own.
+
+    Args:
+        verb: function whose first parameter is a `Question`; the others are options as typer reads them.
+
+    Returns:
+        The function of all options, required ones first, that states the question and calls ``verb``.
+    """
+    shared = inspect.signature(_stated, eval_str=True).parameters
+    _, *own = inspect.signature(verb, eval_str=True).parameters.values()
+
+    @wraps(verb)
+    def command(**given: Any) -> Result:
+        stated = {name: given.pop(name) for name in shared}
+        return verb(_stated(**stated), **given)
+
+    options = sorted([*shared.values(), *own], key=lambda option: option.default is not option.empty)
+    command.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
+    command.__annotations__ = {option.name: option.annotation for option in options}
+    return command
 
 
 def interval(text: str, option: str) -> Interval:

@@ -10,48 +10,26 @@ import typer
 
 from quasilpv.artifact.files import write_readable_json
 from quasilpv.cli.console import JsonOption, print_json, print_note, progress
-from quasilpv.cli.parameters import (
-    CommonOption,
-    ConditionOption,
-    DecayOption,
-    FormOption,
-    RepresentationOption,
-    SampleOption,
-    SetOption,
-    SlackOption,
-    SystemArgument,
-    WindowOption,
-    axis,
-    question,
-)
-from quasilpv.conditions.blocks import Slack
-from quasilpv.conditions.condition import Form, Options
+from quasilpv.cli.parameters import asks_one_question, axis
 from quasilpv.errors import InputError
 from quasilpv.figures.region import region_figure
 from quasilpv.figures.style import save
 from quasilpv.studies.checkpoint import Checkpoint
 from quasilpv.studies.engines import in_processes, on_cluster
+from quasilpv.studies.question import Question
 from quasilpv.studies.region import Map, Region, counts
 
 
+@asks_one_question
 def region_command(
-    system: SystemArgument,
+    asked: Question,
     *,
-    condition: ConditionOption,
     x: Annotated[str, typer.Option("--x", metavar="NAME=FROM:TO:POINTS", help="Horizontal axis.")],
     y: Annotated[str, typer.Option("--y", metavar="NAME=FROM:TO:POINTS", help="Vertical axis.")],
-    representation: RepresentationOption = "",
-    slack: SlackOption = Slack.THESIS,
-    parameters: SetOption = None,
-    decay: DecayOption = 0.0,
-    form: FormOption = Form.REDUCED,
-    common: CommonOption = False,
-    window_s: WindowOption = None,
-    sample_period_s: SampleOption = Options.sample_period_s,
     grid: Annotated[
         bool, typer.Option("--grid/--adaptive", help="Solve every point, or refine a coarse grid along the boundary.")
     ] = False,
-    processes: Annotated[int, typer.Option("--processes", "-j", help="[default: one per core]")] = 0,
+    processes: Annotated[int | None, typer.Option("--processes", "-j", help="[default: one per core]")] = None,
     dask: Annotated[str | None, typer.Option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster.")] = None,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Where results are kept.")] = Path(
         "out/region"
@@ -66,10 +44,8 @@ def region_command(
     Example:
       design region ex-I.1 --condition II.6 --x a=-8:8:17 --y b=-20:20:41
     """
-    options = Options(slack, decay, form, window_s=window_s, common=common, sample_period_s=sample_period_s)
-    asked = question(system, condition, representation, parameters, options)
     across, up = axis(x, "--x"), axis(y, "--y")
-    if processes < 0:
+    if processes is not None and processes < 1:
         raise InputError("command line", "--processes", processes, "at least 1")
     solver = on_cluster(dask) if dask else in_processes(processes or os.cpu_count() or 1)
     memory = Checkpoint(out, asked, (across.name, up.name))
@@ -79,7 +55,7 @@ def region_command(
         steps.begin("points")
         evaluation = Map(asked, across, up, solver=solver, memory=memory, progress=steps.parts)
         region = evaluation.full() if grid else evaluation.adaptive()
-    written = _write(region, out)
+    written = _write(region, memory.path.with_suffix(""))
     if json:
         print_json(region.to_document())
         return
@@ -89,8 +65,8 @@ def region_command(
     print_note(f"wrote {', '.join(map(str, written))}")
 
 
-def _write(region: Region, out: Path) -> list[Path]:
-    stem = out / f"{region.question.system}-{region.question.condition}-{region.x.name}-{region.y.name}"
-    document = stem.with_name(stem.name + ".json")
+def _write(region: Region, stem: Path) -> list[Path]:
+    """The map and its figure beside its checkpoint, whose name tells questions apart."""
+    document = stem.with_name(f"{stem.name}.json")
     write_readable_json(document, region.to_document())
     return [document, *save(region_figure([region]), stem)]

@@ -3,37 +3,15 @@
 from __future__ import annotations
 
 from quasilpv.cli.console import JsonOption, print_json
-from quasilpv.cli.parameters import (
-    CommonOption,
-    ConditionOption,
-    DecayOption,
-    FormOption,
-    RepresentationOption,
-    SampleOption,
-    SetOption,
-    SlackOption,
-    SystemArgument,
-    WindowOption,
-    question,
-)
-from quasilpv.conditions.blocks import Slack
-from quasilpv.conditions.condition import Form, Options
+from quasilpv.cli.parameters import asks_one_question
 from quasilpv.studies import Answer, Sweep, Verdict
-from quasilpv.studies.question import largest_or_reached_margin
+from quasilpv.studies.question import Question, largest_or_reached_margin
 
 
+@asks_one_question
 def solve_command(
-    system: SystemArgument,
+    asked: Question,
     *,
-    condition: ConditionOption,
-    representation: RepresentationOption = "",
-    slack: SlackOption = Slack.THESIS,
-    parameters: SetOption = None,
-    decay: DecayOption = 0.0,
-    form: FormOption = Form.REDUCED,
-    common: CommonOption = False,
-    window_s: WindowOption = None,
-    sample_period_s: SampleOption = Options.sample_period_s,
     json: JsonOption = False,
 ) -> int:
     """Decide whether a condition holds for a system: feasible with a proof, infeasible numerically, or unknown.
@@ -45,8 +23,6 @@ def solve_command(
       design solve ex-I.1 --condition II.6 --set a=1 --set b=2.5
       design solve ex-I.1 --condition II.6 --set b=3 --slack full --json
     """
-    options = Options(slack, decay, form, window_s=window_s, common=common, sample_period_s=sample_period_s)
-    asked = question(system, condition, representation, parameters, options)
     answer = Sweep(asked, ()).at({})
     margin = largest_or_reached_margin(asked, answer)
     if json:
