@@ -186,7 +186,7 @@ def check(A: FloatArray, lyapunov: FloatArray, decay: float, disk: float) -> Non
 def test_when_the_grid_is_evaluated_again_expect_the_reported_rates_and_other_gains_unstable() -> None:
     design = designed()
     delay = 0.5 / RATE_HZ
-    plants = ScheduledPlants.of(robot("arm3"), design.schedule.premises, PlantGrid.full(robot("arm3")))
+    plants = ScheduledPlants.of(robot("arm3"), design.schedule, PlantGrid.full(robot("arm3")))
     loops = plants.loops(design.law)
     worst = max(loops.worst(delay_s=d).growth_rate_per_s for d in (0.0, delay))
     assert worst == pytest.approx(design.report()["worst_growth_rate_per_s"], rel=1e-6)

@@ -19,6 +19,7 @@ import numpy as np
 from quasilpv.conditions.sampled_chains import ChainGains, feedback_gains, observer_gains
 from quasilpv.errors import InfeasibleError
 from quasilpv.synthesis.inertia_range import InertiaRange, largest_inertia_norm, needed_inertia_range
+from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.synthesis.sampled_loop import AccelerationLaw, SampledLoop
 from quasilpv.synthesis.specification import Specification
 from quasilpv.systems.registry import Robot
@@ -158,7 +159,7 @@ class _Search:
 
 
 def design_acceleration_law(
-    robot: Robot, specification: Specification, progress: Progress = no_progress
+    robot: Robot, specification: Specification, progress: Progress = no_progress, scheduled: Schedule | None = None
 ) -> AccelerationDesign:
     """Choose bandwidths, filter and design inertia, and return the gains with their evidence.
 
@@ -166,11 +167,12 @@ def design_acceleration_law(
         robot: nominal model, operating domain, limits and payload set.
         specification: what is asked for.
         progress: called with (points done, points in all).
+        scheduled: the design inertia by only some of its premises; None for all of them.
 
     Raises:
         InfeasibleError: no point of the search meets the margins and the torque activity.
     """
-    needed = needed_inertia_range(robot)
+    needed = needed_inertia_range(robot, scheduled=scheduled)
     search = _Search(
         robot,
         specification,

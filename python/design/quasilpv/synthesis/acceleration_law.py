@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from quasilpv.conditions.sampled_chains import ChainGains
@@ -24,30 +25,37 @@ def acceleration_law(robot: Robot, specification: Specification, progress: Progr
         InfeasibleError: no design meets the specification.
     """
     design = design_acceleration_law(robot, specification, progress)
+    made = acceleration_law_of(robot, specification, design)
+    period, bandwidth = specification.sample_period_s, design.candidate.bandwidths[0]
+    envelope = acceleration_envelope(robot, dict(made.law), period, bandwidth)
+    return replace(made, witness={**(made.witness or {}), "envelope": envelope})
+
+
+def acceleration_law_of(robot: Robot, specification: Specification, design: AccelerationDesign) -> TrackingDesign:
+    """What a design ships, its operating envelope left out.
+
+    Args:
+        robot, specification: what it was made for.
+        design: scalars and evidence.
+    """
     scalars = design.candidate.law
     kp, kd, ki = (float(gain) for gain in scalars.feedback)
-    law = {
-        "kind": "dob-acceleration",
-        "feedback": {"kp": kp, "kd": kd, "ki": ki},
-        "observer": [float(gain) for gain in scalars.observer],
-        "filter_time_constant_s": scalars.filter_time_constant_s,
-        "disturbance_compensation": True,
-        "inertia": inertia_table(robot, design.candidate.inertia_scale),
-    }
     return TrackingDesign(
         controller="dob-acceleration",
         robot=robot,
         sample_period_s=specification.sample_period_s,
-        law=law,
+        law={
+            "kind": "dob-acceleration",
+            "feedback": {"kp": kp, "kd": kd, "ki": ki},
+            "observer": [float(gain) for gain in scalars.observer],
+            "filter_time_constant_s": scalars.filter_time_constant_s,
+            "disturbance_compensation": True,
+            "inertia": inertia_table(robot, design.candidate.inertia_scale),
+        },
         expressions=premise_and_gravity(robot),
         inputs={"controller": "dob-acceleration", "specification": specification.to_document()},
         report=design.report(),
-        witness={
-            **_witness(design),
-            "envelope": acceleration_envelope(
-                robot, law, specification.sample_period_s, design.candidate.bandwidths[0]
-            ),
-        },
+        witness=_witness(design),
     )
 
 

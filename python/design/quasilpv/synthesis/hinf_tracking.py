@@ -27,9 +27,10 @@ from quasilpv.loops.hinf_law import hinf_tracking_law
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.velocity_law import VelocityLaw
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
+from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
-from quasilpv.synthesis.torque_schedule import Schedule, ScheduledPlants, full_schedule
+from quasilpv.synthesis.torque_schedule import ScheduledPlants, full_schedule
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import Robot
 
@@ -182,9 +183,9 @@ def hinf_tracking(robot: Robot, specification: Specification, progress: Progress
             payload and delay within the torque activity.
     """
     chosen = full_schedule(robot)
-    screen = ScheduledPlants.of(robot, chosen.premises, PlantGrid.screen(robot))
+    screen = ScheduledPlants.of(robot, chosen, PlantGrid.screen(robot))
     search = _Search(robot, specification, chosen, screen)
-    full = ScheduledPlants.of(robot, chosen.premises, PlantGrid.full(robot))
+    full = ScheduledPlants.of(robot, chosen, PlantGrid.full(robot))
     for candidate in sorted(search.candidates(progress), key=lambda candidate: candidate.disturbance_gain):
         loops = full.loops(candidate.tables)
         if search.is_stable(loops):

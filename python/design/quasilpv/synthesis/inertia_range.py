@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quasilpv.loops.loop_grid import configurations
+from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.systems.registry import Robot
 
 CONFIGURATIONS = 2000
@@ -23,14 +24,17 @@ class InertiaRange:
     where_highest: tuple[tuple[float, ...], float]
 
 
-def needed_inertia_range(robot: Robot, count: int = CONFIGURATIONS) -> InertiaRange:
-    """Range of ``M_t / M_n`` for M_n the nominal inertia, over a grid of reachable configurations and payloads.
+def needed_inertia_range(robot: Robot, count: int = CONFIGURATIONS, scheduled: Schedule | None = None) -> InertiaRange:
+    """Range of ``M_t / M_n`` over a grid of reachable configurations and payloads.
+
+    M_n is the nominal inertia, or what a schedule by only some of its premises makes of it.
 
     Reachable configurations, not corners of the premise box: the cosines are dependent, and at some corners the inertia
     is not even positive definite. A grid, so a numerical range: the proof is the business of the certificate.
     """
     postures = configurations(robot.domain.angle_rad, count, every_joint=not robot.model.turns_as_one)
-    factor = np.linalg.cholesky(np.array([robot.model.inertia(theta) for theta in postures]))
+    nominal = np.array([robot.model.inertia(theta) for theta in postures])
+    factor = np.linalg.cholesky(nominal if scheduled is None else scheduled.inertia_at(robot, postures))
     found: list[tuple[float, float, int, int, float]] = []
     for fraction in np.linspace(0.0, 1.0, PAYLOAD_FRACTIONS):
         plant = robot.with_payload_fraction(float(fraction))

@@ -24,9 +24,10 @@ from quasilpv.conditions.iv11_reduced import FeedbackPoint, ObserverPoint, feedb
 from quasilpv.errors import InfeasibleError
 from quasilpv.lmi import to_rational
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
+from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.synthesis.specification import Specification
-from quasilpv.synthesis.torque_schedule import Schedule, ScheduledLaw, ScheduledPlants, schedule
+from quasilpv.synthesis.torque_schedule import ScheduledLaw, ScheduledPlants, schedule
 from quasilpv.systems.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
@@ -201,23 +202,47 @@ def design_torque_law(robot: Robot, specification: Specification, progress: Prog
         InfeasibleError: the inequalities have no verified solution, or no point of the search passes the gate within
             the torque activity.
     """
-    chosen = schedule(robot)
-    unit = 2.0 ** round(math.log2(float(np.mean(np.linalg.eigvalsh(chosen.inertia)))))
     about = f"{robot.id}: no dob-torque design at {specification.rate_hz:g} Hz"
     for back_off in BACK_OFFS:
-        search = _Search(
-            robot,
-            specification,
-            chosen,
-            _unit_feedback(chosen.inertia / unit, back_off, about),
-            _unit_observer(chosen.inertia / unit, back_off, about),
-            unit,
-            ScheduledPlants.of(robot, chosen.premises, PlantGrid.screen(robot)),
-        )
+        search = _search(robot, specification, schedule(robot), back_off, about)
         design = _best(search, progress, about)
         if holds_exactly(design.law, design.feedback, design.observer):
             return design
     raise InfeasibleError(f"{about}: the gains as shipped do not satisfy the inequalities in exact arithmetic")
+
+
+@dataclass(frozen=True)
+class TorqueBandwidth:
+    """What `design_torque_law` searches over.
+
+    Attributes:
+        feedback_disk_rad_s, observer_disk_rad_s: radii of the pole disks; the decay rates are fixed fractions of them.
+        filter_time_constant_s: T_f.
+        inertia_scale: s, the design inertia over the nominal one.
+    """
+
+    feedback_disk_rad_s: float
+    observer_disk_rad_s: float
+    filter_time_constant_s: float
+    inertia_scale: float
+
+
+def torque_design_at(
+    robot: Robot, specification: Specification, scheduled: Schedule, bandwidth: TorqueBandwidth
+) -> TorqueDesign:
+    """The design of one bandwidth and one schedule, whatever its growth rates: for comparisons, not for release.
+
+    Raises:
+        InfeasibleError: the inequalities have no verified solution.
+    """
+    about = f"{robot.id}: no dob-torque gains on {len(scheduled.premises)} premises"
+    search = _search(robot, specification, scheduled, BACK_OFFS[0], about)
+    disks, scale = (bandwidth.feedback_disk_rad_s, bandwidth.observer_disk_rad_s), bandwidth.inertia_scale
+    law = search.law(*disks, bandwidth.filter_time_constant_s, scale)
+    plants = ScheduledPlants.of(robot, scheduled, PlantGrid.full(robot))
+    rates = search.growth_rates(law, plants)
+    performance = search.performance(law, plants) if max(rates.values()) < 0.0 else (math.nan, math.nan)
+    return TorqueDesign(scheduled, law, *search.points(*disks, scale), scale, rates, *performance, 1)
 
 
 def holds_exactly(law: ScheduledLaw, feedback: FeedbackPoint, observer: ObserverPoint) -> bool:
@@ -228,6 +253,20 @@ def holds_exactly(law: ScheduledLaw, feedback: FeedbackPoint, observer: Observer
     ) and observer_condition(
         inertia, Fraction(observer.decay), Fraction(observer.disk), Fraction(observer.noise)
     ).holds_at(observer)
+
+
+def _search(robot: Robot, specification: Specification, scheduled: Schedule, back_off: float, about: str) -> _Search:
+    """The unit points of a schedule, solved, with the coarse grid."""
+    unit = 2.0 ** round(math.log2(float(np.mean(np.linalg.eigvalsh(scheduled.inertia)))))
+    return _Search(
+        robot,
+        specification,
+        scheduled,
+        _unit_feedback(scheduled.inertia / unit, back_off, about),
+        _unit_observer(scheduled.inertia / unit, back_off, about),
+        unit,
+        ScheduledPlants.of(robot, scheduled, PlantGrid.screen(robot)),
+    )
 
 
 def _unit_feedback(inertia: FloatArray, back_off: float, about: str) -> FeedbackPoint:
@@ -262,7 +301,7 @@ def _best(search: _Search, progress: Progress, about: str) -> TorqueDesign:
             f"{about}: encoder quantisation may cause torque increments of {bound:.3g} N m rms, "
             f"the quietest stable design has {least:.3g}"
         )
-    plants = ScheduledPlants.of(robot, search.schedule.premises, PlantGrid.full(robot))
+    plants = ScheduledPlants.of(robot, search.schedule, PlantGrid.full(robot))
     for candidate in quiet:
         at = candidate.feedback_disk, candidate.observer_disk
         law = search.law(*at, candidate.filter_time_constant_s, candidate.scale)

@@ -26,19 +26,24 @@ def torque_law(robot: Robot, specification: Specification, progress: Progress = 
     return tracking_design(robot, specification, design_torque_law(robot, specification, progress))
 
 
-def tracking_design(robot: Robot, specification: Specification, design: TorqueDesign) -> TrackingDesign:
+def tracking_design(
+    robot: Robot, specification: Specification, design: TorqueDesign, *, envelope: bool = True
+) -> TrackingDesign:
     """What a design of `design_torque_law` ships.
 
     Args:
         robot, specification: what it was made for.
         design: vertex tables and evidence.
+        envelope: whether to state an operating envelope.
 
     Raises:
         InfeasibleError: the law has no verified operating envelope.
     """
     tables = design.law
     witness = _witness(design)
-    envelope = torque_envelope(robot, VertexTables(tables.inertia, tables.feedback, tables.observer), witness)
+    if envelope:
+        vertices = VertexTables(tables.inertia, tables.feedback, tables.observer)
+        witness["envelope"] = torque_envelope(robot, vertices, witness)
     return TrackingDesign(
         controller="dob-torque",
         robot=robot,
@@ -56,7 +61,7 @@ def tracking_design(robot: Robot, specification: Specification, design: TorqueDe
         },
         inputs={"controller": "dob-torque", "specification": specification.to_document()},
         report=design.report(),
-        witness={**witness, "envelope": envelope},
+        witness=witness,
     )
 
 

@@ -9,15 +9,14 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-import sympy as sp
 
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.frozen_loop import FrozenLaw
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.torque_law import TorqueLaw
 from quasilpv.polytopes import BlockPolytope
+from quasilpv.synthesis.inertia_schedule import Schedule, schedule_of
 from quasilpv.synthesis.plant_grid import PlantGrid
-from quasilpv.systems.premise import Premise
 from quasilpv.systems.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
@@ -28,23 +27,6 @@ in torque coordinates must serve all of them: already for a single joint the squ
 this ratio, and between 5 and 6 there is no Q at all."""
 
 
-@dataclass(frozen=True, eq=False)
-class Schedule:
-    """The measured premises the gains depend on, and the design inertia on their box.
-
-    Attributes:
-        premises: those scheduled; the others sit at the middle of their interval, and what they change is disturbance.
-        polytope: Takagi-Sugeno representation of their box: for up to two premises no other has tighter vertices.
-        inertia: vertices of the nominal inertia, (N, n, n), kg m^2.
-        spread: largest eigenvalue of M_i^-1 M_j over the vertices.
-    """
-
-    premises: tuple[Premise, ...]
-    polytope: BlockPolytope
-    inertia: FloatArray
-    spread: float
-
-
 def schedule(robot: Robot) -> Schedule:
     """As many inertia premises as keep the spread below `LARGEST_SPREAD`; among equals the smallest spread.
 
@@ -53,7 +35,7 @@ def schedule(robot: Robot) -> Schedule:
     """
     count = len(robot.model.inertia_premises(robot.domain))
     for size in range(count, -1, -1):
-        candidates = [_schedule_of(robot, chosen) for chosen in itertools.combinations(range(count), size)]
+        candidates = [schedule_of(robot, chosen) for chosen in itertools.combinations(range(count), size)]
         best = min(candidates, key=lambda candidate: candidate.spread)
         if best.spread < LARGEST_SPREAD:
             return best
@@ -66,24 +48,10 @@ def full_schedule(robot: Robot) -> Schedule:
     Raises:
         InfeasibleError: at some corner of their box the inertia is not positive definite.
     """
-    whole = _schedule_of(robot, tuple(range(len(robot.model.inertia_premises(robot.domain)))))
+    whole = schedule_of(robot, tuple(range(len(robot.model.inertia_premises(robot.domain)))))
     if math.isinf(whole.spread):
         raise InfeasibleError(f"{robot.id}: the nominal inertia is not definite at every corner of the premise box")
     return whole
-
-
-def _schedule_of(robot: Robot, chosen: tuple[int, ...]) -> Schedule:
-    premises, affine = robot.model.inertia_premises(robot.domain), robot.model.inertia_affine()
-    middle = np.array([(p.lower + p.upper) / 2.0 for p in premises])
-    middle[list(chosen)] = 0.0
-    scheduled = tuple(premises[k] for k in chosen)
-    polytope = BlockPolytope.takagi_sugeno([p.lower for p in scheduled], [p.upper for p in scheduled])
-    vertices = polytope.vertices(affine.evaluate(middle), affine.coefficients[list(chosen)])
-    vertices = (vertices + vertices.swapaxes(1, 2)) / 2.0
-    if np.linalg.eigvalsh(vertices).min() <= 0.0:
-        return Schedule(scheduled, polytope, vertices, math.inf)
-    pairs = np.linalg.solve(vertices[:, None], vertices[None, :])
-    return Schedule(scheduled, polytope, vertices, float(np.linalg.eigvals(pairs).real.max()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,11 +94,9 @@ class ScheduledPlants:
     premises: FloatArray
 
     @classmethod
-    def of(cls, robot: Robot, premises: tuple[Premise, ...], plants: PlantGrid) -> ScheduledPlants:
+    def of(cls, robot: Robot, scheduled: Schedule, plants: PlantGrid) -> ScheduledPlants:
         """Evaluate the premises of a robot on a grid."""
-        evaluate = sp.lambdify(robot.model.symbolic.theta, [premise.expression for premise in premises])
-        values = np.array([evaluate(*theta) for theta in plants.angles], dtype=float)
-        return cls(plants, values.reshape(len(plants.angles), len(premises)))
+        return cls(plants, scheduled.premise_values(robot, plants.angles))
 
     def loops(self, law: Scheduled) -> LoopGrid:
         """A law against all plants."""
