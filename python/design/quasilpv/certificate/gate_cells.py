@@ -1,14 +1,14 @@
 """Positive definiteness of an inertia-like matrix over a box of postures and payloads: one cell at a time.
 
 A posture is n - 1 angles delta, the differences of neighbouring absolute angles (of a serial arm theta_2 ... theta_n).
-A `Pencil` is ``X(delta, f) = sum_p f^p (K_p0 + sum_k cos(s_k) K_pk)``, symmetric, cubic in the payload fraction f, with
-``s_k = delta_{i+1} + ... + delta_j`` for the pair (i, j) of cosine k, up to a symmetric error no entry of which exceeds
-``rest``. A cell is ``delta_a = middle_a +- h_a`` and f in [u, v]. With X_0 ... X_3 the Bernstein coefficients of X in f
-on [u, v], X > 0 on the whole cell if for each of them and for every corner sigma (a sign per angle)
+A `Pencil` is ``X(delta, f) = sum_p f^p (K_p0 + sum_k cos(s_k) K_pk)``, symmetric, of degree d in the payload fraction
+f, with integer combinations ``s_k = sum_a N_ak delta_a``, up to a symmetric error no entry of which exceeds ``rest``. A
+cell is ``delta_a = middle_a +- h_a`` and f in [u, v]. With X_0 ... X_d the Bernstein coefficients of X in f on [u, v],
+X > 0 on the whole cell if for each of them and for every corner sigma (a sign per angle)
 
     X_j(middle) + sum_a sigma_a h_a dX_j/ddelta_a (middle) - diag(r_j) > 0,
 
-    r_j = row sums of  rest + sum_k H_k^2 / 2 |K_jk|   (entrywise),   H_k = h_{i+1} + ... + h_j:
+    r_j = row sums of  rest + sum_k H_k^2 / 2 |K_jk|   (entrywise),   H_k = sum_a |N_ak| h_a:
 
 X(f) is a convex combination of the X_j; by Taylor's theorem ``cos(s_k)`` differs from its tangent by at most H_k^2 / 2;
 a symmetric matrix whose entries are at most R_ab in absolute value is at most the diagonal matrix of the row sums of R;
@@ -25,26 +25,26 @@ Computer Aided Geometric Design 29, 379 (the Bernstein hull).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
+from math import comb, lcm
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 from flint import arb, ctx, fmpq
 
-from quasilpv.certificate.gate_inertia import Pair
-
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntegerArray: TypeAlias = npt.NDArray[Any]
 """Array of Python integers of any size."""
 
-DEGREE = 3
 ANGLE_BITS = 40
 MAX_SCALE_BITS = 20
 COEFFICIENT_BITS = 64
+MAX_CELLS = 100_000
+GUIDE_SLACK = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,16 +52,18 @@ class Pencil:
     """See the module; integer coefficients in a unit of its own, which definiteness does not see.
 
     Attributes:
-        coefficients: shape (4, 1 + m, n, n): power of f, then constant and m cosines.
+        coefficients: shape (d + 1, 1 + m, n, n): power of f, then constant and m cosines.
         rest: shape (n, n).
+        angles: N, shape (n - 1, m), integers: cosine k is that of ``sum_a N_ak delta_a``.
     """
 
     coefficients: IntegerArray
     rest: IntegerArray
+    angles: IntegerArray
 
     @classmethod
-    def enclosing(cls, coefficients: IntegerArray, rest: IntegerArray) -> Pencil:
-        """From rational arrays of these shapes: scaled, and rounded down with the error added to the rest.
+    def enclosing(cls, coefficients: IntegerArray, rest: IntegerArray, angles: IntegerArray) -> Pencil:
+        """From arrays of these shapes, two of them rational: scaled, and rounded down with the error added to the rest.
 
         Rows and columns are scaled alike by powers of two so that no link is small: that congruence leaves definiteness
         alone and makes the row sums of the test less pessimistic. f and cosines are at most 1 in absolute value, so the
@@ -75,7 +77,12 @@ class Pencil:
         terms = coefficients.shape[0] * coefficients.shape[1]
         rounded = np.array([int((x / unit).floor()) for x in coefficients.ravel()], dtype=object)
         bounds = [int((x / unit).ceil()) + terms for x in (rest * scale[:, None] * scale).ravel()]
-        return cls(rounded.reshape(coefficients.shape), np.array(bounds, dtype=object).reshape(rest.shape))
+        return cls(rounded.reshape(coefficients.shape), np.array(bounds, dtype=object).reshape(rest.shape), angles)
+
+    @property
+    def degree(self) -> int:
+        """d, the degree in the payload fraction."""
+        return len(self.coefficients) - 1
 
     def to_floats(self) -> tuple[FloatArray, FloatArray]:
         """Coefficients and rest as doubles, scaled so that the largest coefficient is 1."""
@@ -134,67 +141,93 @@ class Cells:
         return start, start + step
 
 
-def smallest_eigenvalues(
-    pencil: tuple[FloatArray, FloatArray], pairs: Sequence[Pair], cells: Cells
-) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+def smallest_eigenvalues(pencil: Pencil, cells: Cells) -> tuple[FloatArray, npt.NDArray[np.intp]]:
     """The guide: per cell, the smallest eigenvalue of all matrices to be tested, and the axis best cut next.
 
     Args:
-        pencil: `Pencil.to_floats`.
-        pairs: cosine k is ``cos(delta_{i+1} + ... + delta_j)`` for its pair (i, j).
+        pencil: used in doubles, its largest coefficient scaled to 1.
         cells: N cells.
     """
-    K, rest = pencil
+    K, rest = pencil.to_floats()
     low, high = cells.bounds()
     middle, half = (low + high)[:, :-1] / 2, (high - low)[:, :-1] / 2
-    sums = _pair_matrix(pairs, half.shape[1])
-    blossom = np.moveaxis(np.array(_blossom(low[:, -1], high[:, -1])), -1, 0) / DEGREE
+    sums = pencil.angles.astype(float)
+    reach = half @ np.abs(sums)
+    blossom = _blossom(pencil.degree, low[:, -1], high[:, -1]) / _binomials(pencil.degree)
     matrices = np.einsum("njp,pkab->njkab", blossom, K)
     slopes = matrices[:, :, 1:]
     centre = matrices[:, :, 0] + np.einsum("nk,njkab->njab", np.cos(middle @ sums), slopes)
     gradient = -np.einsum("nd,dk,nk,njkab->ndjab", half, sums, np.sin(middle @ sums), slopes)
-    bends = ((half @ sums) ** 2 / 2)[:, None, :, None] * np.abs(slopes).sum(axis=-1)
+    bends = (reach**2 / 2)[:, None, :, None] * np.abs(slopes).sum(axis=-1)
     margin = bends.sum(axis=2) + rest.sum(axis=-1)
     corners = np.einsum("sd,ndjab->nsjab", _signs(half.shape[1]), gradient)
     tested = centre[:, None] + corners - (margin[..., None] * np.eye(K.shape[-1]))[:, None]
     smallest = np.linalg.eigvalsh(tested)[..., 0].min(axis=(1, 2))
 
-    share = half[:, :, None] * sums / np.maximum(half @ sums, np.finfo(float).tiny)[:, None]
+    share = half[:, :, None] * np.abs(sums) / np.maximum(reach, np.finfo(float).tiny)[:, None]
     bent = np.einsum("ndk,nk->nd", share, bends.max(axis=(1, 3)))
     curved = np.abs(np.diff(centre, n=2, axis=1)).max(axis=(1, 2, 3))
     return smallest, np.column_stack([bent, curved]).argmax(axis=1)
 
 
-def are_positive_definite(pencil: Pencil, pairs: Sequence[Pair], cells: Cells) -> npt.NDArray[np.bool_]:
+def are_positive_definite(pencil: Pencil, cells: Cells) -> npt.NDArray[np.bool_]:
     """The verdict: per cell, whether the pencil is positive definite on it, proved in integer arithmetic.
 
     Args:
         pencil: integer coefficients.
-        pairs: as for the guide.
         cells: N cells.
     """
-    K, unit = pencil.coefficients, 1 << ANGLE_BITS
-    n = K.shape[-1]
-    sums = _pair_matrix(pairs, n - 1).astype(int).astype(object)
+    K, unit, sums = pencil.coefficients, 1 << ANGLE_BITS, pencil.angles
     depth = int(cells.level[:, -1].max(initial=0))
     width = np.array([1 << (depth - level) for level in cells.level[:, -1].tolist()], dtype=object)
     start = width * cells.index[:, -1].astype(object)
-    blossom = np.moveaxis(np.array(_blossom(start, start + width, 1 << depth)), -1, 0)  # 3 * 8^depth times the weights
+    # The weights of Bernstein's form, times _binomials * 2^(degree * depth).
+    blossom = _blossom(pencil.degree, start, start + width, 1 << depth)
     matrices = (blossom[..., None, None, None] * K).sum(axis=2)
     constant, slopes = matrices[:, :, 0], matrices[:, :, 1:]
-    half, cosine, sine = _exact_postures(pairs, cells)
-    reach = half.dot(sums)  # H_k in units
+    half, cosine, sine = _exact_postures(sums, cells)
+    reach = half.dot(abs(sums))  # H_k in units
     # In units of 1 / (2 unit^2). Cosine and sine are short of the truth by at most 2 units each.
     bend = reach**2 + 4 * unit + 4 * reach
     centre = 2 * unit**2 * constant + 2 * unit * _weighted(cosine, slopes)
-    rest = pencil.rest.sum(axis=-1) * (2 * unit**2 * DEGREE << (DEGREE * depth))
+    rest = pencil.rest.sum(axis=-1) * (2 * unit**2 * _binomials(pencil.degree) << (pencil.degree * depth))
     margin = _weighted(bend, np.abs(slopes)).sum(axis=-1) + rest
-    centre = centre - margin[..., None] * np.eye(n, dtype=int).astype(object)
+    centre = centre - margin[..., None] * np.eye(K.shape[-1], dtype=int).astype(object)
     definite = np.ones(len(cells), dtype=bool)
-    for signs in _signs(n - 1).astype(int).astype(object):
+    for signs in _signs(len(sums)).astype(int).astype(object):
         deviation = (half * signs).dot(sums) * sine
         definite &= _are_minors_positive(centre - 2 * _weighted(deviation, slopes)).all(axis=1)
     return definite
+
+
+def prove_positive(
+    pencil: Pencil, domain: Cells, refutes: Callable[[FloatArray], npt.NDArray[np.bool_]]
+) -> int | FloatArray | None:
+    """Cut a domain until the pencil is proved positive definite on every cell.
+
+    Args:
+        pencil: what has to be positive definite.
+        domain: cells that cover where.
+        refutes: which of the points (N, axes) in the middle of cells, in doubles, show that it is not.
+
+    Returns:
+        The number of cells of a complete proof; or the first point that refutes; or None: more than `MAX_CELLS` cells.
+    """
+    cells, proved = domain, 0
+    while len(cells):
+        if proved + len(cells) > MAX_CELLS:
+            return None
+        low, high = cells.bounds()
+        middle = (low + high) / 2
+        beyond = refutes(middle)
+        if beyond.any():
+            return np.asarray(middle[int(beyond.argmax())])
+        smallest, axis = smallest_eigenvalues(pencil, cells)
+        done = smallest > GUIDE_SLACK
+        done[done] = are_positive_definite(pencil, cells.only(done))
+        proved += int(done.sum())
+        cells = cells.only(~done).halved(axis[~done])
+    return proved
 
 
 def cosine_enclosure(low: fmpq, high: fmpq, bits: int) -> tuple[int, int]:
@@ -214,14 +247,14 @@ def cosine_enclosure(low: fmpq, high: fmpq, bits: int) -> tuple[int, int]:
     return max(below, -unit), min(above, unit)
 
 
-def _exact_postures(pairs: Sequence[Pair], cells: Cells) -> tuple[IntegerArray, IntegerArray, IntegerArray]:
-    """Half widths h_a rounded up, and cosine and sine of the middle of every pair's sum rounded down, in units.
+def _exact_postures(sums: IntegerArray, cells: Cells) -> tuple[IntegerArray, IntegerArray, IntegerArray]:
+    """Half widths h_a rounded up, and cosine and sine of the middle of every combination rounded down, in units.
 
     Shapes (N, n - 1), (N, m) and (N, m).
     """
     count, angles = cells.level.shape[0], cells.level.shape[1] - 1
     half = np.empty((count, angles), dtype=object)
-    cosine, sine = (np.empty((count, len(pairs)), dtype=object) for _ in range(2))
+    cosine, sine = (np.empty((count, sums.shape[1]), dtype=object) for _ in range(2))
     unit = 1 << ANGLE_BITS
     with ctx.workprec(2 * ANGLE_BITS):
         for cell in range(count):
@@ -230,8 +263,9 @@ def _exact_postures(pairs: Sequence[Pair], cells: Cells) -> tuple[IntegerArray, 
                 low, high = cells.exact_interval(cell, axis)
                 middles.append((low + high) / 2)
                 half[cell, axis] = int(((high - low) / 2 * unit).ceil())
-            for k, (i, j) in enumerate(pairs):
-                sine_ball, cosine_ball = arb(sum(middles[i:j], fmpq(0))).sin_cos()
+            for k, factors in enumerate(sums.T):
+                angle = sum((m * factor for m, factor in zip(middles, factors, strict=True)), fmpq(0))
+                sine_ball, cosine_ball = arb(angle).sin_cos()
                 sine[cell, k] = _rounded_down(sine_ball * unit)
                 cosine[cell, k] = _rounded_down(cosine_ball * unit)
     return half, cosine, sine
@@ -242,27 +276,31 @@ def _rounded_down(ball: arb) -> int:
     return int(ball.lower().fmpq().floor())
 
 
-def _pair_matrix(pairs: Sequence[Pair], angles: int) -> FloatArray:
-    """Zeros and ones, (angles, m): column k sums the angles delta_{i+1} ... delta_j of pair k."""
-    sums = np.zeros((angles, len(pairs)))
-    for k, (i, j) in enumerate(pairs):
-        sums[i:j, k] = 1.0
-    return sums
+def _binomials(degree: int) -> int:
+    """The least common multiple of all binomial(degree, p): it makes Bernstein coefficients of integers integers."""
+    return lcm(*(comb(degree, p) for p in range(degree + 1)))
 
 
-def _blossom(u: Any, v: Any, unit: Any = 1) -> list[list[Any]]:
-    """Rows j, columns p: 3 times the Bernstein coefficient j of ``f^p`` on [u, v], degree 3; u, v in units of 1/unit.
+def _blossom(degree: int, u: Any, v: Any, unit: int = 1) -> npt.NDArray[Any]:
+    """Bernstein coefficient j of ``f^p`` on [u, v] times `_binomials` and ``unit^degree``, shape (N, d + 1, d + 1).
 
-    The coefficient is the elementary symmetric polynomial of degree p of (v repeated j times, u repeated 3 - j times)
-    over binomial(3, p); everything is multiplied by ``unit^3``.
+    The coefficient is the elementary symmetric polynomial of degree p of (v repeated j times, u repeated d - j times)
+    over binomial(d, p).
+
+    Args:
+        degree: d.
+        u, v: N ends each, in units of 1 / unit.
+        unit: see above.
     """
-    one = u * 0 + 1
-    rows = []
-    for j in range(DEGREE + 1):
-        i = DEGREE - j
-        second = j * (j - 1) // 2 * v * v + i * j * u * v + i * (i - 1) // 2 * u * u
-        rows.append([3 * unit**3 * one, (j * v + i * u) * unit**2, second * unit, 3 * v**j * u**i])
-    return rows
+    table = [
+        [
+            sum(comb(j, k) * comb(degree - j, p - k) * v**k * u ** (p - k) for k in range(p + 1))
+            * (_binomials(degree) // comb(degree, p) * unit ** (degree - p))
+            for p in range(degree + 1)
+        ]
+        for j in range(degree + 1)
+    ]
+    return np.moveaxis(np.array(table), -1, 0)
 
 
 @cache
@@ -272,7 +310,7 @@ def _signs(size: int) -> FloatArray:
 
 
 def _weighted(weights: IntegerArray, matrices: IntegerArray) -> IntegerArray:
-    """``sum_k weights[n, k] matrices[n, j, k]``, shape (N, 4, n, n)."""
+    """``sum_k weights[n, k] matrices[n, j, k]``, shape (N, d + 1, n, n)."""
     return np.asarray((weights[:, None, :, None, None] * matrices).sum(axis=2))
 
 

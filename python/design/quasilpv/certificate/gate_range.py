@@ -10,36 +10,30 @@ posture and sometimes no definite inertia.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Literal, TypeAlias
 
 import numpy as np
-from flint import fmpq
+from flint import fmpq, fmpq_mat, fmpq_poly
 
-from quasilpv.certificate.exact_matrices import rational
-from quasilpv.certificate.gate_cells import (
-    DEGREE,
-    Cells,
-    FloatArray,
-    Pencil,
-    are_positive_definite,
-    cosine_enclosure,
-    smallest_eigenvalues,
-)
+from quasilpv.certificate.cosine_matrices import CosineMatrix
+from quasilpv.certificate.exact_matrices import rational, zero
+from quasilpv.certificate.gate_cells import Cells, FloatArray, Pencil, cosine_enclosure, prove_positive
 from quasilpv.certificate.gate_inertia import InertiaData, Pair, design_inertia, true_inertia
 from quasilpv.certificate.gate_rationals import float_at_least, float_at_most, to_float, to_floats
 from quasilpv.errors import InputError
 
 Side: TypeAlias = Literal["lowest", "highest"]
 
+DEGREE = 3
+"""Of M_t in the payload fraction."""
+
 TOLERANCE = 0.002
 LOOSEST_TOLERANCE = 0.1
 SAMPLES = 3000
 SAMPLED_FRACTIONS = 9
 CLIMB_STEPS = 60
-MAX_CELLS = 100_000
-GUIDE_SLACK = 1e-10
 BOUND_BITS = 30
 BOX_BITS = 100
 
@@ -79,6 +73,11 @@ class NeededRange:
 class InertiaPair:
     """The true and the design inertia of one robot: exact pencils, and sampled ratios.
 
+    Attributes:
+        data: as shipped.
+        true: M_t(delta, f) in absolute angles.
+        design: M_n(delta) in absolute angles.
+
     Raises:
         InputError: on the operating domain a premise leaves the box the run-time clamps it to.
     """
@@ -87,13 +86,11 @@ class InertiaPair:
         """Build both inertias from the shipped data."""
         _require_premises_inside_box(data)
         self.data = data
-        self._true = true_inertia(data)
-        self._design = design_inertia(data)
-        n = data.joints
-        true = [[[to_float(self._true[i][j][p]) for p in range(DEGREE + 1)] for j in range(n)] for i in range(n)]
-        self._true_floats = np.array(true)
-        self._design_floats = to_floats(self._design.constant)
-        self._slope_floats = {pair: to_floats(slope) for pair, slope in self._design.slopes.items()}
+        self.true, self.design = _true_matrix(data), _design_matrix(data)
+        true, design = true_inertia(data), design_inertia(data)
+        self._true_floats = np.array([[[to_float(x[p]) for p in range(DEGREE + 1)] for x in row] for row in true])
+        self._design_floats = to_floats(design.constant)
+        self._slope_floats = {pair: to_floats(slope) for pair, slope in design.slopes.items()}
 
     def domain(self) -> Cells:
         """All postures (differences of neighbouring absolute angles) and payload fractions as one cell."""
@@ -102,18 +99,8 @@ class InertiaPair:
 
     def pencil(self, side: Side, bound: fmpq) -> Pencil:
         """``M_t - bound M_n`` for a lowest ratio, ``bound M_n - M_t`` for a highest."""
-        n, pairs = self.data.joints, self.data.pairs
-        sign = 1 if side == "lowest" else -1
-        K = np.full((DEGREE + 1, 1 + len(pairs), n, n), fmpq(0), dtype=object)
-        for i, j in product(range(n), repeat=2):
-            place = 0 if i == j else 1 + pairs.index((min(i, j), max(i, j)))
-            for power in range(DEGREE + 1):
-                K[power, place, i, j] = sign * self._true[i][j][power]
-            K[0, 0, i, j] -= sign * bound * self._design.constant[i, j]
-            for pair, slope in self._design.slopes.items():
-                K[0, 1 + pairs.index(pair), i, j] -= sign * bound * slope[i, j]
-        rest = np.array([abs(bound) * entry for entry in self._design.rest.entries()], dtype=object)
-        return Pencil.enclosing(K, rest.reshape(n, n))
+        sign = fmpq(1 if side == "lowest" else -1)
+        return (self.true * sign + self.design * (-sign * bound)).to_pencil()
 
     def ratios(self, points: FloatArray) -> FloatArray:
         """Eigenvalues of ``M_n^-1 M_t`` in doubles, ascending, (N, n), at points (posture, f), (N, n).
@@ -216,24 +203,9 @@ class _Side:
 
     def _prove(self, bound: fmpq) -> int | FloatArray | None:
         """Cells of a complete proof; or a point that refutes the bound; or None: too many cells."""
-        pairs = self._inertia.data.pairs
+        limit = self._sign * to_float(bound)
         pencil = self._inertia.pencil(self._side, bound)
-        guide = pencil.to_floats()
-        cells, proved = self._inertia.domain(), 0
-        while len(cells):
-            if proved + len(cells) > MAX_CELLS:
-                return None
-            low, high = cells.bounds()
-            middle = (low + high) / 2
-            beyond = self._extremes(middle) > self._sign * to_float(bound)
-            if beyond.any():
-                return np.asarray(middle[int(beyond.argmax())])
-            smallest, axis = smallest_eigenvalues(guide, pairs, cells)
-            done = smallest > GUIDE_SLACK
-            done[done] = are_positive_definite(pencil, pairs, cells.only(done))
-            proved += int(done.sum())
-            cells = cells.only(~done).halved(axis[~done])
-        return proved
+        return prove_positive(pencil, self._inertia.domain(), lambda points: self._extremes(points) > limit)
 
     def _extremes(self, points: FloatArray) -> FloatArray:
         """Largest ratio at each point, or smallest ratio with the opposite sign: larger is more extreme."""
@@ -278,6 +250,37 @@ def _require_premises_inside_box(data: InertiaData) -> None:
         lower, upper = data.premise_lower[p], data.premise_upper[p]
         if below < rational(lower) or above > rational(upper):
             raise InputError("law", f"inertia: box of premise {p}", f"[{lower}, {upper}]", "its range on the domain")
+
+
+def _true_matrix(data: InertiaData) -> CosineMatrix:
+    """``D_kl(f) cos(alpha_k - alpha_l)``, exactly."""
+    n, D = data.joints, true_inertia(data)
+    terms = {(0,) * (n - 1): _powers(n, [(D[i][i], i, i) for i in range(n)])}
+    for i, j in data.pairs:
+        terms[_difference(n, (i, j))] = _powers(n, [(D[i][j], i, j), (D[j][i], j, i)])
+    return CosineMatrix(terms, zero(n, n))
+
+
+def _design_matrix(data: InertiaData) -> CosineMatrix:
+    """M_n with what its vertices' rounding adds."""
+    n, design = data.joints, design_inertia(data)
+    slopes = {_difference(n, pair): (slope,) for pair, slope in design.slopes.items()}
+    return CosineMatrix({(0,) * (n - 1): (design.constant,), **slopes}, design.rest)
+
+
+def _powers(n: int, entries: Sequence[tuple[fmpq_poly, int, int]]) -> tuple[fmpq_mat, ...]:
+    """Entries that are polynomials in f, each at its row and column, as matrices by power."""
+    matrices = [zero(n, n) for _ in range(DEGREE + 1)]
+    for polynomial, i, j in entries:
+        for power, matrix in enumerate(matrices):
+            matrix[i, j] = polynomial[power]
+    return tuple(matrices)
+
+
+def _difference(n: int, pair: Pair) -> tuple[int, ...]:
+    """``alpha_j - alpha_i = delta_{i+1} + ... + delta_j`` as a combination of the n - 1 angles delta."""
+    i, j = pair
+    return tuple(int(i <= a < j) for a in range(n - 1))
 
 
 def _cosines(absolute: FloatArray) -> FloatArray:
