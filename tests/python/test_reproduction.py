@@ -35,6 +35,8 @@ REQUIRED = {
         for name in ("I.4", "I.5", "I.7", "II.1", "II.2", "II.3", "II.4", "II.5", "II.7", "III.1", "III.3")
     ),
     *(f"table-{name}" for name in ("I.2", "I.5", "II.1", "II.2", "II.3", "II.4")),
+    *(f"fig-{name}" for name in ("IV.15", "IV.16")),
+    "table-IV.6",
     "study-conservatism",
 }
 

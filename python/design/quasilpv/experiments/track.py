@@ -85,9 +85,15 @@ class RunFiles:
 
 
 def write_run_files(
-    folder: Path, experiment: TrackingExperiment, artifact: Artifact, *, plant: PlantKind, sensors: Sensors
+    folder: Path,
+    experiment: TrackingExperiment,
+    artifact: Artifact,
+    *,
+    plant: PlantKind,
+    sensors: Sensors,
+    transport_delay_s: float = 0.0,
 ) -> RunFiles:
-    """Write artifact, trajectory and scenario of one run into ``folder``.
+    """Write artifact, trajectory and scenario of one run into ``folder``; arguments as those of `track`.
 
     Raises:
         InputError: the controller is for another robot, or the folder cannot be written.
@@ -102,6 +108,7 @@ def write_run_files(
         plant=plant,
         sensors=sensors,
         external_torque=experiment.external_torque,
+        transport_delay_s=transport_delay_s,
         initial_angle_rad=experiment.initial_angle_rad,
     )
     return RunFiles(
@@ -118,6 +125,7 @@ def track(
     *,
     plant: PlantKind,
     sensors: Sensors,
+    transport_delay_s: float = 0.0,
     variant: Variant | None = None,
 ) -> TrackResult:
     """Run one controller on one experiment in closed loop, in this process.
@@ -128,13 +136,16 @@ def track(
         folder: where the run's files are written; the run reads them from there.
         plant: the true plant.
         sensors: encoders and speed noise.
+        transport_delay_s: from a sample to the moment its torque acts.
         variant: what to call the controller; by default its law kind, which several controllers share.
 
     Raises:
         InputError: robot and controller do not fit, or the folder cannot be written.
         PlantError: the plant could not be integrated.
     """
-    files = write_run_files(folder, experiment, artifact, plant=plant, sensors=sensors)
+    files = write_run_files(
+        folder, experiment, artifact, plant=plant, sensors=sensors, transport_delay_s=transport_delay_s
+    )
     runtime = _runtime.Artifact.load(str(files.artifact))
     columns = _runtime.run_closed_loop(
         runtime, _runtime.Trajectory.load(str(files.trajectory)), _runtime.Scenario.load(str(files.scenario))

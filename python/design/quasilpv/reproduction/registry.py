@@ -11,6 +11,7 @@ from quasilpv.reproduction import (
     complexity_growth,
     complexity_tables,
     conservatism,
+    lumped_premises,
     nonquadratic,
     overbounding,
 )
@@ -26,6 +27,7 @@ ITEMS: dict[str, Item] = {
         chapter_two_design,
         nonquadratic,
         chapter_three,
+        lumped_premises,
         complexity_tables,
         conservatism,
     )
