@@ -8,6 +8,7 @@
 #include "arm_fixtures.hpp"
 #include "artifact_fixture.hpp"
 #include "quasilpv/loop.hpp"
+#include "quasilpv/messages.hpp"
 #include "quasilpv/realtime.hpp"
 #include "quasilpv/scenario.hpp"
 #include "quasilpv/trajectory.hpp"
@@ -59,6 +60,13 @@ inline measurement_v1 measurement(std::int64_t seq, const JointArray& angle = kS
   message.seq = seq;
   std::copy(angle.begin(), angle.end(), message.angle_rad);
   return message;
+}
+
+inline RobotReading reading(std::int64_t seq, const JointArray& angle = kStart) {
+  RobotReading result;
+  result.seq = seq;
+  result.angle_rad = angle;
+  return result;
 }
 
 inline SampleConditions at(std::int64_t seq) {

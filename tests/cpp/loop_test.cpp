@@ -14,6 +14,7 @@
 #include "loop_fixture.hpp"
 #include "quasilpv/errors.hpp"
 #include "quasilpv/in_process_link.hpp"
+#include "quasilpv/link_robot.hpp"
 #include "quasilpv/realtime.hpp"
 #include "quasilpv/run_controller.hpp"
 
@@ -31,15 +32,12 @@ using ::quasilpv::testing::kPatience;
 using ::quasilpv::testing::kSamplePeriod;
 using ::quasilpv::testing::kStart;
 using ::quasilpv::testing::measurement;
+using ::quasilpv::testing::reading;
 using ::quasilpv::testing::trajectory;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-JointArray torque_of(const ControlLoop& loop) {
-  JointArray torque;
-  std::copy(std::begin(loop.command().torque_nm), std::end(loop.command().torque_nm), torque.begin());
-  return torque;
-}
+JointArray torque_of(const ControlLoop& loop) { return loop.command().torque_nm; }
 
 TEST(ControlLoop, when_artifact_and_trajectory_differ_in_joints_expect_refusal) {
   const Artifact two = Artifact::parse(json_twin(artifact_table("pid", 2)), "test");
@@ -55,11 +53,12 @@ TEST(ControlLoop, when_samples_are_missing_expect_the_steps_of_a_controller_with
     StepInput input;
     input.seq = seq;
     input.valid = seq == 0 || seq == 1 || seq == 5;
+    input.commanded = input.valid;
     input.angle = input.valid ? kStart : JointArray{};
     input.reference = reference.evaluate(static_cast<double>(seq) * kSamplePeriod);
     expected = controller.step(input);
     if (input.valid) {
-      loop.handle(measurement(seq), at(seq));
+      loop.handle(reading(seq), at(seq));
     }
   }
   EXPECT_EQ(torque_of(loop), expected.torque_applied);
@@ -71,8 +70,8 @@ TEST(ControlLoop, when_samples_are_missing_expect_the_steps_of_a_controller_with
 TEST(ControlLoop, when_20_samples_are_missing_expect_a_latched_fault_and_a_bounded_number_of_steps) {
   for (const std::int64_t next : {21LL, 22LL, 1'000'000'000LL}) {
     ControlLoop loop(artifact(), trajectory(), {});
-    loop.handle(measurement(0), at(0));
-    loop.handle(measurement(next), at(next));
+    loop.handle(reading(0), at(0));
+    loop.handle(reading(next), at(next));
     EXPECT_EQ(loop.state(), ControllerState::kFault) << next;
     EXPECT_EQ(loop.cause(), FaultCause::kMeasurementLost);
     EXPECT_EQ(loop.steps(), 22);
@@ -81,24 +80,24 @@ TEST(ControlLoop, when_20_samples_are_missing_expect_a_latched_fault_and_a_bound
 
 TEST(ControlLoop, when_19_samples_are_missing_expect_no_fault) {
   ControlLoop loop(artifact(), trajectory(), {});
-  loop.handle(measurement(0), at(0));
-  loop.handle(measurement(20), at(20));
+  loop.handle(reading(0), at(0));
+  loop.handle(reading(20), at(20));
   EXPECT_EQ(loop.predicted_steps(), 19);
   EXPECT_EQ(loop.state(), ControllerState::kRunning);
 }
 
 TEST(ControlLoop, when_one_measurement_is_nan_expect_prediction_flag_and_a_normal_next_sample) {
   ControlLoop loop(artifact(), trajectory(), {});
-  loop.handle(measurement(0), at(0));
-  loop.handle(measurement(1, {kStart[0], kNaN, kStart[2]}), at(1));
+  loop.handle(reading(0), at(0));
+  loop.handle(reading(1, {kStart[0], kNaN, kStart[2]}), at(1));
   EXPECT_EQ(loop.state(), ControllerState::kDegraded);
   EXPECT_EQ(loop.command().flags & kMeasurementInvalid, kMeasurementInvalid);
   for (const double torque : torque_of(loop)) {
     EXPECT_TRUE(std::isfinite(torque));
   }
-  loop.handle(measurement(2), at(2));
+  loop.handle(reading(2), at(2));
   EXPECT_EQ(loop.state(), ControllerState::kRunning);
-  EXPECT_EQ(loop.command().flags & kMeasurementInvalid, 0);
+  EXPECT_EQ(loop.command().flags & kMeasurementInvalid, 0u);
   EXPECT_EQ(loop.predicted_steps(), 1);
 }
 
@@ -108,13 +107,13 @@ TEST_P(AfterAFault, reaches_the_safe_torque_within_50_ms_without_a_jump_and_stay
   LoopSettings settings;
   settings.safe_action = GetParam();
   ControlLoop loop(artifact(), trajectory(), settings);
-  loop.handle(measurement(0), at(0));
+  loop.handle(reading(0), at(0));
   std::int64_t seq = 1;
   JointArray before{};
   for (; loop.state() != ControllerState::kFault; ++seq) {
     ASSERT_LE(seq, 20);
     before = torque_of(loop);
-    loop.handle(measurement(seq, {kNaN, kNaN, kNaN}), at(seq));
+    loop.handle(reading(seq, {kNaN, kNaN, kNaN}), at(seq));
   }
   const JointArray at_fault = torque_of(loop);
   EXPECT_EQ(at_fault, before);
@@ -126,7 +125,7 @@ TEST_P(AfterAFault, reaches_the_safe_torque_within_50_ms_without_a_jump_and_stay
   constexpr double kRampSamples = 40.0;
   for (std::int64_t sample = 0; sample < 200; ++sample, ++seq) {
     const JointArray previous = torque_of(loop);
-    loop.handle(measurement(seq), at(seq));
+    loop.handle(reading(seq), at(seq));
     for (std::size_t j = 0; j < kJoints; ++j) {
       const double torque = torque_of(loop)[j];
       ASSERT_LE(std::abs(torque - previous[j]), std::abs(at_fault[j] - safe[j]) / kRampSamples + 1e-9);
@@ -148,7 +147,7 @@ class RunningController : public ::testing::Test {
  protected:
   void start(const ControllerRunSettings& settings) {
     thread_ = std::thread([this, settings] {
-      report_ = run_controller(loop_, *ends_.first, nullptr, settings, stop_);
+      report_ = run_controller(loop_, robot_, settings, stop_);
       finished_ = true;
     });
   }
@@ -183,6 +182,7 @@ class RunningController : public ::testing::Test {
   std::pair<std::unique_ptr<InProcessLink>, std::unique_ptr<InProcessLink>> ends_ =
       InProcessLink::create_pair(identity_of(law_));
   InProcessLink& plant_ = *ends_.second;
+  LinkRobot robot_{*ends_.first};
   ControlLoop loop_{law_, trajectory(), {}};
   std::atomic<bool> stop_{false};
   std::atomic<bool> finished_{false};

@@ -12,6 +12,7 @@
 
 #include "loop_fixture.hpp"
 #include "quasilpv/in_process_link.hpp"
+#include "quasilpv/link_robot.hpp"
 #include "quasilpv/run_controller.hpp"
 #include "quasilpv/simulation.hpp"
 
@@ -55,11 +56,12 @@ TEST_P(EveryLaw, gives_over_a_link_in_lock_step_the_samples_of_the_in_process_ru
 
   auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
   ControlLoop loop(law, trajectory(), {});
-  auto ring = std::make_unique<TelemetryPublisher::Ring>();
+  auto ring = std::make_unique<SampleRing>();
+  loop.publish_to(ring.get());
+  LinkRobot robot(*controller_end);
   const std::atomic<bool> stop{false};
   ControllerRunReport controller_report;
-  std::thread thread(
-      [&, link = controller_end.get()] { controller_report = run_controller(loop, *link, ring.get(), {}, stop); });
+  std::thread thread([&] { controller_report = run_controller(loop, robot, {}, stop); });
   PlantSession session(experiment, kSamplePeriod);
   Record record;
   const PlantRunReport plant_report = run_plant(session, *plant_end, {}, &record, stop);
@@ -110,8 +112,8 @@ TEST(PlantLoop, when_the_first_copy_of_every_measurement_is_lost_expect_the_same
         lost = received.seq;
         continue;
       }
-      loop.handle(received, at(received.seq));
-      link->send(loop.command());
+      loop.handle(to_reading(received), at(received.seq));
+      link->send(to_message(loop.command()));
       ++answered;
     }
   });

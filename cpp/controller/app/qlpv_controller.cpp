@@ -1,4 +1,6 @@
-// qlpv-controller: one artifact, one trajectory, one run over LCM. Contract: docs/reference/messages.md
+// qlpv-controller: one artifact, one trajectory, one run over LCM; a doctor; a reset. Contract:
+// docs/reference/messages.md
+#include <algorithm>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -6,8 +8,11 @@
 
 #include "quasilpv/artifact.hpp"
 #include "quasilpv/command_line.hpp"
+#include "quasilpv/doctor.hpp"
 #include "quasilpv/lcm_link.hpp"
+#include "quasilpv/link_robot.hpp"
 #include "quasilpv/loop.hpp"
+#include "quasilpv/reset_fault.hpp"
 #include "quasilpv/run_controller.hpp"
 #include "quasilpv/run_report.hpp"
 #include "quasilpv/telemetry_publisher.hpp"
@@ -20,19 +25,26 @@ using namespace quasilpv;  // NOLINT(google-build-using-namespace): this file is
 struct Options {
   CommonOptions common;
   std::string trajectory;
-  SafeAction safe_action = SafeAction::kZero;
+  LoopSettings loop;
   ControllerRunSettings run;
 };
 
 void declare_all(CLI::App& app, Options& options) {
   static const std::map<std::string, SafeAction> kActions{{"zero", SafeAction::kZero},
                                                           {"gravity", SafeAction::kGravity}};
-  app.footer(help_footer());
+  app.footer(
+      help_footer() +
+      "\n\nAlso: qlpv-controller --doctor (will this machine hold the rate?), qlpv-controller --reset-fault (leave a "
+      "latched fault); each has its own --help.");
   declare(app, options.common);
   app.add_option("--trajectory", options.trajectory, "the reference, JSON or CBOR")->required();
-  app.add_option("--safe-action", options.safe_action, "torque after a fault: zero (default), or gravity minus damping")
+  app.add_option("--safe-action", options.loop.safe_action,
+                 "torque after a fault: zero (default), or gravity minus damping")
       ->transform(CLI::CheckedTransformer(kActions, CLI::ignore_case).description(""));
   app.add_option("--silence-s", options.run.silence_s, "realtime: fault after so long without a measurement")
+      ->check(CLI::PositiveNumber.description(""))
+      ->capture_default_str();
+  app.add_option("--start-ramp-s", options.loop.ramp_s, "realtime: way from the hold torque to the full range")
       ->check(CLI::PositiveNumber.description(""))
       ->capture_default_str();
   app.add_flag("--exit-on-fault", options.run.exit_on_fault, "end the run once a fault has led to the safe torque");
@@ -50,6 +62,8 @@ Json describe(const ControlLoop& loop, const ControllerRunReport& run, const Tel
           {"commands", run.commands},
           {"repeated_commands", run.repeated},
           {"deadline_overruns", run.deadline_overruns},
+          {"faults", loop.faults()},
+          {"resets", run.resets},
           {"rt", realtime},
           {"step_ns", to_json(loop.step_time())},
           {"wakeup_ns", to_json(run.arrival)},
@@ -59,7 +73,8 @@ Json describe(const ControlLoop& loop, const ControllerRunReport& run, const Tel
            {{"published", telemetry.published},
             {"drops", telemetry.drops},
             {"record_drops", telemetry.record_drops},
-            {"send_failures", telemetry.send_failures}}}};
+            {"send_failures", telemetry.send_failures}}},
+          {"post_mortem", to_json(loop.post_mortem(), loop.cause(), loop.joints())}};
 }
 
 int exit_code(const ControlLoop& loop, const ControllerRunReport& run, const CommonOptions& options) {
@@ -78,10 +93,10 @@ int run(const CLI::App& app, Options& options) {
   const CommonOptions& common = options.common;
   const Artifact artifact = Artifact::load(common.artifact);
   const Trajectory trajectory = Trajectory::load(options.trajectory);
-  LoopSettings settings;
-  settings.safe_action = options.safe_action;
-  settings.realtime = apply_priority(app, common);
-  ControlLoop loop(artifact, trajectory, settings);
+  options.loop.realtime = apply_priority(app, common);
+  // In lock-step a run is the run in process, bit for bit; there is no arm that a bump could harm.
+  options.loop.bumpless_start = common.pace == Pace::kRealTime;
+  ControlLoop loop(artifact, trajectory, options.loop);
 
   const WireIdentity identity = identity_of(common, artifact);
   LcmLink link(Side::kController, identity, common.url, common.allow_network);
@@ -91,15 +106,144 @@ int run(const CLI::App& app, Options& options) {
 
   options.run.pace = common.pace;
   options.run.timeout_s = common.timeout_s;
-  const ControllerRunReport report = run_controller(loop, link, &publisher.ring(), options.run, install_stop_signals());
+  loop.publish_to(&publisher.ring());
+  LinkRobot robot(link);
+  const ControllerRunReport report = run_controller(loop, robot, options.run, install_stop_signals());
   const TelemetryReport telemetry = publisher.stop();
-  print_report(std::cout, describe(loop, report, telemetry, link.counters(), settings.realtime), common.json);
+  print_report(std::cout, describe(loop, report, telemetry, link.counters(), options.loop.realtime), common.json);
   return exit_code(loop, report, common);
+}
+
+struct DoctorOptions {
+  CommonOptions common;
+  double rate_hz = 1000.0;
+  double seconds = 3.0;
+};
+
+void declare_doctor(CLI::App& app, DoctorOptions& options) {
+  app.footer("Example:\n  qlpv-controller --doctor --artifact artifact.json\n\nExit codes: 0 measured, 2 bad input.");
+  app.add_flag("--doctor", "measure whether this machine will hold the rate, and say what to change");
+  app.add_option("--artifact", options.common.artifact, "measure the step of this controller, at its rate");
+  app.add_option("--rate-hz", options.rate_hz, "the rate without an artifact")
+      ->check(CLI::Range(1.0, 1e5).description(""))
+      ->capture_default_str();
+  app.add_option("--seconds", options.seconds, "of each measurement")
+      ->check(CLI::Range(0.01, 3600.0).description(""))
+      ->capture_default_str();
+  declare_transport(app, options.common);
+  options.common.priority = 50;
+  declare_priority(app, options.common)->capture_default_str();
+  app.add_flag("--json", options.common.json, "report as one line of JSON");
+}
+
+/// Normal scheduling first, then what is granted: the step and the round trip under the better of both.
+DoctorFindings examine(const DoctorOptions& options, const std::optional<Artifact>& artifact) {
+  DoctorFindings findings;
+  findings.period_ns = to_nanoseconds(artifact ? artifact->sample_period_s() : 1.0 / options.rate_hz);
+  const auto samples = std::max<std::int64_t>(1, to_nanoseconds(options.seconds) / findings.period_ns);
+  findings.preempt_rt = is_preempt_rt();
+  findings.wakeup = measure_wakeup(findings.period_ns, samples);
+  findings.realtime = enter_realtime(options.common.priority);
+  if (findings.realtime.fifo) {
+    findings.wakeup_fifo = measure_wakeup(findings.period_ns, samples);
+  }
+  if (artifact) {
+    findings.step = measure_step(*artifact, samples);
+  }
+  try {
+    const WireIdentity identity{monotonic_ns(), 0, 1};
+    LcmLink plant(Side::kPlant, identity, options.common.url, options.common.allow_network);
+    LcmLink controller(Side::kController, identity, options.common.url, options.common.allow_network);
+    findings.round_trip = measure_round_trip(plant, controller, findings.period_ns, samples);
+  } catch (const TransportError& error) {
+    findings.transport_error = error.what();
+  }
+  return findings;
+}
+
+Json describe(const DoctorFindings& findings) {
+  const auto optional = [](const std::optional<LatencyHistogram>& histogram) {
+    return histogram ? to_json(*histogram) : Json(nullptr);
+  };
+  return {{"verdict", to_string(judge(findings))},
+          {"period_ns", findings.period_ns},
+          {"wakeup_ns", to_json(findings.wakeup)},
+          {"wakeup_fifo_ns", optional(findings.wakeup_fifo)},
+          {"step_ns", optional(findings.step)},
+          {"round_trip_ns", optional(findings.round_trip)},
+          {"fifo", findings.realtime.fifo},
+          {"memory_locked", findings.realtime.memory_locked},
+          {"preempt_rt", findings.preempt_rt},
+          {"multicast", findings.transport_error.empty()},
+          {"advice", advice(findings)}};
+}
+
+int run_doctor(const DoctorOptions& options) {
+  apply_cpu(options.common);
+  std::optional<Artifact> artifact;
+  if (!options.common.artifact.empty()) {
+    artifact = Artifact::load(options.common.artifact);
+  }
+  const DoctorFindings findings = examine(options, artifact);
+  Json report = describe(findings);
+  if (!options.common.json) {
+    report.erase("advice");
+  }
+  print_report(std::cout, report, options.common.json);
+  if (!options.common.json) {
+    std::cout << "\nAt " << kNanosecondsPerSecond / findings.period_ns << " Hz this machine "
+              << to_string(judge(findings)) << ".\n";
+    for (const std::string& sentence : advice(findings)) {
+      std::cout << "- " << sentence << '\n';
+    }
+  }
+  return kExitDone;
+}
+
+void declare_reset(CLI::App& app, CommonOptions& options) {
+  app.footer(
+      "Example:\n  qlpv-controller --reset-fault --artifact artifact.json --session 7\n\n"
+      "Exit codes: 0 out of the fault, 2 bad input, 3 still in the fault, 5 no controller of this session.");
+  app.add_flag("--reset-fault", "ask the running controller of this session to leave its latched fault");
+  declare_identity(app, options);
+  declare_transport(app, options);
+  options.timeout_s = 1.0;
+  app.add_option("--timeout-s", options.timeout_s, "ask for so long")
+      ->check(CLI::PositiveNumber.description(""))
+      ->capture_default_str();
+}
+
+int run_reset(const CommonOptions& options) {
+  const Artifact artifact = Artifact::load(options.artifact);
+  LcmLink link(Side::kOperator, identity_of(options, artifact), options.url, options.allow_network);
+  switch (request_reset(link, options.timeout_s)) {
+    case ResetOutcome::kLeft:
+      return kExitDone;
+    case ResetOutcome::kStillFault:
+      std::cerr << "qlpv-controller: still in fault: its cause is not gone\n";
+      return kExitFaultStop;
+    case ResetOutcome::kSilent:
+      break;
+  }
+  throw_never_heard(options, "command", "qlpv-controller");
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  const auto has = [&](const std::string& flag) { return std::find(argv, argv + argc, flag) != argv + argc; };
+  if (has("--doctor")) {
+    DoctorOptions options;
+    return run_main(
+        argc, argv, "qlpv-controller", "Measures whether this machine will hold the rate of a controller.",
+        [&](CLI::App& app) { declare_doctor(app, options); }, [&](const CLI::App&) { return run_doctor(options); });
+  }
+  if (has("--reset-fault")) {
+    CommonOptions options;
+    return run_main(
+        argc, argv, "qlpv-controller", "Asks a running controller to leave its latched fault.",
+        [&](CLI::App& app) { declare_reset(app, options); }, [&](const CLI::App&) { return run_reset(options); });
+  }
   Options options;
   return run_main(
       argc, argv, "qlpv-controller", "Runs one controller against a plant over LCM until the plant ends the run.",

@@ -20,6 +20,8 @@ StepReport Controller::step(const StepInput& input) noexcept { return law_->step
 
 void Controller::reset() noexcept { law_->reset(); }
 
+void Controller::take_over(const JointArray& in_force, double ramp_s) noexcept { law_->take_over(in_force, ramp_s); }
+
 int Controller::joints() const noexcept { return joints_; }
 
 double Controller::sample_period_s() const noexcept { return sample_period_s_; }

@@ -88,6 +88,12 @@ FailsafeState next_state(const FailsafeSettings& settings, const FailsafeState& 
   return next;
 }
 
+FailsafeState after_reset(const FailsafeSettings& settings, const FailsafeState& state,
+                          const FailsafeFlags& flags) noexcept {
+  const bool healthy = flags.consecutive_invalid == 0 && fault_cause(settings, flags, 0) == FaultCause::kNone;
+  return state.state == ControllerState::kFault && healthy ? FailsafeState{} : state;
+}
+
 FailsafeAction action_of(const FailsafeSettings& settings, const FailsafeState& state, std::int64_t now_ns) noexcept {
   if (state.state != ControllerState::kFault) {
     return {};

@@ -1,5 +1,6 @@
 #include "quasilpv/link.hpp"
 
+#include <algorithm>
 #include <type_traits>
 
 #include "quasilpv/realtime.hpp"
@@ -70,9 +71,33 @@ void Link::accept_event(const void* bytes, std::size_t size) noexcept {
   if (count(status)) {
     // Events are rare and carry the sample index: several of one sample are not duplicates of each other.
     ++counters_.accepted;
-    event_.newest = event;
-    event_.fresh = true;
+    counters_.lost_events += events_.put(event) ? 0 : 1;
   }
+}
+
+bool Link::EventQueue::put(const event_v1& event) noexcept {
+  if (count == kCapacity) {
+    return false;
+  }
+  events[(first + count) % kCapacity] = event;
+  ++count;
+  return true;
+}
+
+bool Link::EventQueue::take(event_v1& event) noexcept {
+  if (count == 0) {
+    return false;
+  }
+  event = events[first];
+  first = (first + 1) % kCapacity;
+  --count;
+  return true;
+}
+
+std::int64_t Link::take_longest_wrong_run() noexcept {
+  const std::int64_t longest = std::max(longest_wrong_run_, counters_.consecutive_wrong);
+  longest_wrong_run_ = 0;
+  return longest;
 }
 
 bool Link::count(DecodeStatus status) noexcept {
@@ -97,6 +122,7 @@ bool Link::count(DecodeStatus status) noexcept {
       break;
   }
   ++counters_.consecutive_wrong;
+  longest_wrong_run_ = std::max(longest_wrong_run_, counters_.consecutive_wrong);
   return false;
 }
 

@@ -1,6 +1,7 @@
 #include "quasilpv/loop.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "quasilpv/errors.hpp"
@@ -15,12 +16,6 @@ int premises_of(const Artifact& artifact) {
 
 void copy(const JointArray& source, double (&target)[kMaxJoints]) noexcept {
   std::copy(source.begin(), source.end(), target);
-}
-
-JointArray to_array(const double (&source)[kMaxJoints]) noexcept {
-  JointArray target;
-  std::copy(std::begin(source), std::end(source), target.begin());
-  return target;
 }
 
 }  // namespace
@@ -38,15 +33,25 @@ ControlLoop::ControlLoop(const Artifact& artifact, const Trajectory& trajectory,
   telemetry_.realtime = settings.realtime ? 1 : 0;
 }
 
-void ControlLoop::handle(const measurement_v1& measurement, const SampleConditions& conditions) noexcept {
+void ControlLoop::handle(const RobotReading& reading, const SampleConditions& conditions) noexcept {
   if (started()) {
-    predict_missing(measurement.seq, conditions);
+    predict_missing(reading.seq, conditions);
+  }
+  if (!begun_) {
+    begin_without_a_bump(reading.angle_rad);
   }
   StepInput input;
-  input.seq = measurement.seq;
-  input.angle = to_array(measurement.angle_rad);
-  input.speed = to_array(measurement.speed_rad_s);
+  input.seq = reading.seq;
+  input.angle = reading.angle_rad;
+  input.speed = reading.speed_rad_s;
   step(input, conditions, false);
+}
+
+void ControlLoop::begin_without_a_bump(const JointArray& angle) noexcept {
+  begun_ = std::all_of(angle.begin(), angle.begin() + joints(), [](double value) { return std::isfinite(value); });
+  if (begun_ && settings_.bumpless_start) {
+    controller_.take_over(safe_torque_.hold(angle), settings_.ramp_s);
+  }
 }
 
 void ControlLoop::handle_silence(const SampleConditions& conditions) noexcept {
@@ -65,6 +70,7 @@ void ControlLoop::predict_missing(std::int64_t next_seq, const SampleConditions&
     StepInput input;
     input.seq = first + i;
     input.valid = false;
+    input.commanded = false;
     step(input, conditions, false);
   }
 }
@@ -86,9 +92,13 @@ void ControlLoop::step(const StepInput& sample, const SampleConditions& conditio
     consecutive_invalid_ = 0;
     last_valid_angle_ = input.angle;
   }
+  const std::int64_t faults_before = faults_;
   judge(report, conditions, plant_silent);
   write_command(report, input, conditions.now_ns);
   write_telemetry(input, report, step_ns);
+  if (faults_ > faults_before) {
+    post_mortem_.keep();
+  }
 }
 
 void ControlLoop::judge(const StepReport& report, const SampleConditions& conditions, bool plant_silent) noexcept {
@@ -100,11 +110,23 @@ void ControlLoop::judge(const StepReport& report, const SampleConditions& condit
   observed.law_invalid = (report.flags & (kTorqueNotFinite | kModelInvalid)) != 0;
   observed.plant_silent = plant_silent;
   observed.stop_requested = conditions.stop_requested;
+  observed_ = observed;
   const bool was_fault = failsafe_.state == ControllerState::kFault;
   failsafe_ = next_state(settings_.failsafe, failsafe_, observed, conditions.now_ns);
   if (!was_fault && failsafe_.state == ControllerState::kFault) {
     torque_at_fault_ = last_torque_;
+    ++faults_;
   }
+}
+
+bool ControlLoop::reset_fault() noexcept {
+  const FailsafeState next = after_reset(settings_.failsafe, failsafe_, observed_);
+  if (next.state == failsafe_.state) {
+    return false;
+  }
+  failsafe_ = next;
+  controller_.take_over(last_torque_, settings_.ramp_s);
+  return true;
 }
 
 bool ControlLoop::is_safe(std::int64_t now_ns) const noexcept {
@@ -118,9 +140,9 @@ void ControlLoop::write_command(const StepReport& report, const StepInput& input
                                                              last_valid_angle_, input.speed)
                                         : report.torque_applied;
   command_.seq = input.seq;
-  command_.state = static_cast<std::int32_t>(failsafe_.state);
-  command_.flags = static_cast<std::int32_t>(report.flags);
-  copy(last_torque_, command_.torque_nm);
+  command_.state = failsafe_.state;
+  command_.flags = report.flags;
+  command_.torque_nm = last_torque_;
 }
 
 void ControlLoop::write_telemetry(const StepInput& input, const StepReport& report, std::int64_t step_ns) noexcept {
@@ -141,6 +163,11 @@ void ControlLoop::write_telemetry(const StepInput& input, const StepReport& repo
   copy(report.torque_commanded, telemetry_.commanded_torque_nm);
   copy(last_torque_, telemetry_.applied_torque_nm);
   std::copy(report.premise.begin(), report.premise.end(), telemetry_.premise);
+  post_mortem_.add(telemetry_);
+  if (ring_ != nullptr) {
+    telemetry_.drops = ring_->drops();
+    ring_->push(telemetry_);
+  }
 }
 
 }  // namespace quasilpv

@@ -36,7 +36,7 @@ class ObserverLaw : public ControlLaw {
     state_.write_to(report);
     const Command<N> command = control(state_, model, reference, report);
     to_array<N>(command.torque, report.torque_commanded);
-    report.flags |= limiter_.apply(report.torque_commanded, report.torque_applied);
+    report.flags |= limiter_.apply(report.torque_commanded, input.commanded, report.torque_applied);
     if (valid) {
       integrate_error<N>(y - reference.angle, command.integral_gain, report, sample_period_s_, state_.integral_error);
     }
@@ -49,6 +49,11 @@ class ObserverLaw : public ControlLaw {
   void reset() noexcept final {
     started_ = false;
     limiter_.reset();
+  }
+
+  void take_over(const JointArray& in_force, double ramp_s) noexcept final {
+    reset();
+    limiter_.take_over(in_force, ramp_s);
   }
 
  protected:

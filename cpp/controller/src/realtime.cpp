@@ -13,6 +13,25 @@ namespace {
 std::atomic<bool> g_stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only touch lock-free atomics");
 
+cpu_set_t cores_at_start() noexcept {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  sched_getaffinity(0, sizeof(cores), &cores);
+  return cores;
+}
+
+const cpu_set_t g_cores_at_start = cores_at_start();
+
+void touch_stack() noexcept {
+  constexpr std::size_t kStackBytes = 256 * 1024;
+  constexpr std::size_t kPageBytes = 4096;
+  char stack[kStackBytes];
+  volatile char* const pages = stack;  // volatile: the writes are the purpose
+  for (std::size_t i = 0; i < kStackBytes; i += kPageBytes) {
+    pages[i] = 0;
+  }
+}
+
 extern "C" void request_stop(int /*signal*/) { g_stop_requested.store(true, std::memory_order_relaxed); }
 
 }  // namespace
@@ -37,6 +56,7 @@ void sleep_until(std::int64_t deadline_ns) noexcept {
 RealtimeStatus enter_realtime(int priority) noexcept {
   RealtimeStatus status;
   status.memory_locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+  touch_stack();
   sched_param parameters{};
   parameters.sched_priority = priority;
   status.fifo = sched_setscheduler(0, SCHED_FIFO, &parameters) == 0;
@@ -46,6 +66,17 @@ RealtimeStatus enter_realtime(int priority) noexcept {
 void leave_realtime() noexcept {
   const sched_param parameters{};
   sched_setscheduler(0, SCHED_OTHER, &parameters);
+  sched_setaffinity(0, sizeof(g_cores_at_start), &g_cores_at_start);
+}
+
+bool pin_to_cpu(int cpu) noexcept {
+  if (cpu < 0 || cpu >= CPU_SETSIZE) {
+    return false;
+  }
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  CPU_SET(cpu, &cores);
+  return sched_setaffinity(0, sizeof(cores), &cores) == 0;
 }
 
 const std::atomic<bool>& install_stop_signals() noexcept {

@@ -10,14 +10,12 @@ namespace {
 
 constexpr std::int64_t kLongestWaitNs = 10 * kNanosecondsPerMillisecond;
 constexpr std::int64_t kLongestStopNs = 100 * kNanosecondsPerMillisecond;
-constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
 
 class ControllerRun {
  public:
-  ControllerRun(ControlLoop& loop, Link& link, TelemetryPublisher::Ring* ring, const ControllerRunSettings& settings)
+  ControllerRun(ControlLoop& loop, Robot& robot, const ControllerRunSettings& settings)
       : loop_(loop),
-        link_(link),
-        ring_(ring),
+        robot_(robot),
         settings_(settings),
         period_ns_(to_nanoseconds(loop.sample_period_s())),
         silence_ns_(to_nanoseconds(settings.silence_s)),
@@ -25,19 +23,22 @@ class ControllerRun {
         last_heard_ns_(monotonic_ns()) {}
 
   ControllerRunReport run(const std::atomic<bool>& stop) noexcept {
-    link_.send(EventCode::kStarted, 0);
+    robot_.announce(ControllerNews::kStarted, 0, FaultCause::kNone);
     std::optional<ControllerRunEnd> end;
     while (!end) {
-      link_.receive(wait_ns());
+      RobotReading reading;
+      const bool read = robot_.read(reading, wait_ns());
       now_ns_ = monotonic_ns();
       if (stop.load(std::memory_order_relaxed) && !stop_since_ns_) {
         stop_since_ns_ = now_ns_;
       }
-      answer_newest();
+      if (read) {
+        answer(reading);
+      }
       answer_silence();
       end = find_end();
     }
-    link_.send(EventCode::kEnded, loop_.last_seq());
+    robot_.announce(ControllerNews::kEnded, loop_.last_seq(), loop_.cause());
     report_.end = *end;
     return report_;
   }
@@ -49,7 +50,7 @@ class ControllerRun {
   std::int64_t policy_clock(std::int64_t seq) const noexcept { return is_real_time() ? now_ns_ : seq * period_ns_; }
 
   SampleConditions conditions(std::int64_t seq) const noexcept {
-    return {policy_clock(seq), consecutive_overruns_, link_.counters().consecutive_wrong, stop_since_ns_.has_value()};
+    return {policy_clock(seq), consecutive_overruns_, robot_.take_longest_foreign_run(), stop_since_ns_.has_value()};
   }
 
   std::int64_t wait_ns() const noexcept {
@@ -60,20 +61,16 @@ class ControllerRun {
     return std::clamp<std::int64_t>(until - monotonic_ns(), 0, kLongestWaitNs);
   }
 
-  void answer_newest() noexcept {
-    measurement_v1 measurement;
-    if (!link_.take(measurement)) {
-      return;
-    }
+  void answer(const RobotReading& reading) noexcept {
     last_heard_ns_ = now_ns_;
     silent_pacer_.reset();
-    if (loop_.is_new(measurement.seq)) {
-      report_.arrival.add(now_ns_ - measurement.utime * kNanosecondsPerMicrosecond);
-      loop_.handle(measurement, conditions(measurement.seq));
+    if (loop_.is_new(reading.seq)) {
+      report_.arrival.add(now_ns_ - reading.taken_ns);
+      loop_.handle(reading, conditions(reading.seq));
       send_command();
       count_overrun();
-    } else if (!is_real_time() && measurement.seq == loop_.last_seq()) {
-      link_.send(loop_.command());
+    } else if (!is_real_time() && reading.seq == loop_.last_seq()) {
+      robot_.write(loop_.command());
       ++report_.commands;
       ++report_.repeated;
     }
@@ -95,15 +92,11 @@ class ControllerRun {
   }
 
   void send_command() noexcept {
-    link_.send(loop_.command());
+    robot_.write(loop_.command());
     ++report_.commands;
-    if (ring_ != nullptr) {
-      loop_.telemetry().drops = ring_->drops();
-      ring_->push(loop_.telemetry());
-    }
-    if (loop_.state() == ControllerState::kFault && !fault_announced_) {
-      fault_announced_ = true;
-      link_.send(EventCode::kFault, loop_.last_seq(), static_cast<std::int64_t>(loop_.cause()));
+    if (loop_.faults() > faults_announced_) {
+      faults_announced_ = loop_.faults();
+      robot_.announce(ControllerNews::kFault, loop_.last_seq(), loop_.cause());
     }
   }
 
@@ -119,9 +112,12 @@ class ControllerRun {
   }
 
   std::optional<ControllerRunEnd> find_end() noexcept {
-    event_v1 event;
-    if (link_.take(event) && event.code == static_cast<std::int32_t>(EventCode::kEnded)) {
+    const RobotRequest request = robot_.take_request();
+    if (request == RobotRequest::kEnd) {
       return ControllerRunEnd::kPlantEnded;
+    }
+    if (request == RobotRequest::kResetFault) {
+      report_.resets += loop_.reset_fault() ? 1 : 0;
     }
     const bool safe = loop_.started() && loop_.is_safe(policy_clock(loop_.last_seq()));
     if (stop_since_ns_ && (safe || !loop_.started() || now_ns_ - *stop_since_ns_ > kLongestStopNs)) {
@@ -137,8 +133,7 @@ class ControllerRun {
   }
 
   ControlLoop& loop_;
-  Link& link_;
-  TelemetryPublisher::Ring* ring_;
+  Robot& robot_;
   ControllerRunSettings settings_;
   std::int64_t period_ns_;
   std::int64_t silence_ns_;
@@ -148,7 +143,7 @@ class ControllerRun {
   std::int64_t consecutive_overruns_ = 0;
   std::optional<std::int64_t> stop_since_ns_;
   std::optional<Pacer> silent_pacer_;
-  bool fault_announced_ = false;
+  std::int64_t faults_announced_ = 0;
   ControllerRunReport report_;
 };
 
@@ -170,9 +165,9 @@ const char* to_string(ControllerRunEnd end) noexcept {
   return "unknown";
 }
 
-ControllerRunReport run_controller(ControlLoop& loop, Link& link, TelemetryPublisher::Ring* ring,
-                                   const ControllerRunSettings& settings, const std::atomic<bool>& stop) noexcept {
-  return ControllerRun(loop, link, ring, settings).run(stop);
+ControllerRunReport run_controller(ControlLoop& loop, Robot& robot, const ControllerRunSettings& settings,
+                                   const std::atomic<bool>& stop) noexcept {
+  return ControllerRun(loop, robot, settings).run(stop);
 }
 
 }  // namespace quasilpv

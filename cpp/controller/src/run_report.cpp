@@ -46,7 +46,34 @@ Json to_json(const LinkCounters& counters) {
           {"wrong_type", counters.wrong_type},
           {"wrong_session", counters.wrong_session},
           {"wrong_artifact", counters.wrong_artifact},
+          {"lost_events", counters.lost_events},
           {"send_failures", counters.send_failures}};
+}
+
+Json to_json(const PostMortem& post_mortem, FaultCause cause, int joints) {
+  if (post_mortem.size() == 0 || cause == FaultCause::kStopRequested) {
+    return nullptr;
+  }
+  using Values = double(telemetry_v1::*)[kMaxJoints];
+  static const std::pair<const char*, Values> kColumns[] = {
+      {"reference_angle_rad", &telemetry_v1::reference_angle_rad},
+      {"measured_angle_rad", &telemetry_v1::measured_angle_rad},
+      {"estimated_angle_rad", &telemetry_v1::estimated_angle_rad},
+      {"estimated_speed_rad_s", &telemetry_v1::estimated_speed_rad_s},
+      {"torque_commanded_nm", &telemetry_v1::commanded_torque_nm},
+      {"torque_applied_nm", &telemetry_v1::applied_torque_nm}};
+  Json report = {{"cause", to_string(cause)}};
+  for (std::size_t i = 0; i < post_mortem.size(); ++i) {
+    const telemetry_v1& sample = post_mortem[i];
+    report["seq"].push_back(sample.seq);
+    report["state"].push_back(sample.state);
+    report["flags"].push_back(sample.flags);
+    report["step_ns"].push_back(sample.step_ns);
+    for (const auto& [name, values] : kColumns) {
+      report[name].push_back(std::vector<double>(sample.*values, sample.*values + joints));
+    }
+  }
+  return report;
 }
 
 void print_report(std::ostream& out, const Json& report, bool as_json) {

@@ -29,6 +29,15 @@ SafeTorque::SafeTorque(const Artifact& artifact, SafeAction action)
   }
 }
 
+JointArray SafeTorque::hold(const JointArray& angle) const noexcept {
+  JointArray torque{};
+  gravity_.evaluate({angle.data(), nullptr, nullptr}, torque.data());
+  for (std::size_t j = 0; j < joints_; ++j) {
+    torque[j] = std::clamp(finite_or_zero(torque[j]), -torque_limit_[j], torque_limit_[j]);
+  }
+  return torque;
+}
+
 JointArray SafeTorque::apply(double share, const JointArray& from, const JointArray& last, const JointArray& angle,
                              const JointArray& speed) const noexcept {
   JointArray gravity{};

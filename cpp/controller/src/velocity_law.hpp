@@ -32,7 +32,7 @@ class VelocityLaw : public ControlLaw {
     const ModelSample<N> model = sample_model<N>(model_, sample.angle, report);
     const Command<N> command = control(sample, model, report);
     to_array<N>(command.torque, report.torque_commanded);
-    report.flags |= limiter_.apply(report.torque_commanded, report.torque_applied);
+    report.flags |= limiter_.apply(report.torque_commanded, input.commanded, report.torque_applied);
     if (valid) {
       integrate_error<N>(reference.angle - sample.angle, command.integral_gain, report, sample_period_s_, integral_);
     }
@@ -43,6 +43,11 @@ class VelocityLaw : public ControlLaw {
   void reset() noexcept final {
     measurement_.reset();
     limiter_.reset();
+  }
+
+  void take_over(const JointArray& in_force, double ramp_s) noexcept final {
+    reset();
+    limiter_.take_over(in_force, ramp_s);
   }
 
  protected:

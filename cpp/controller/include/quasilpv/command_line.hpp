@@ -26,6 +26,7 @@ struct CommonOptions {
   std::string record;
   Pace pace = Pace::kLockStep;
   int priority = 0;  ///< 0: normal scheduling
+  int cpu = -1;      ///< -1: any core
   bool require_realtime = false;
   double timeout_s = 10.0;
   bool json = false;
@@ -41,19 +42,31 @@ inline std::string help_footer(const std::string& more_exit_codes = "") {
          more_exit_codes + ".";
 }
 
-inline void declare(CLI::App& app, CommonOptions& options) {
-  static const std::map<std::string, Pace> kPaces{{"lockstep", Pace::kLockStep}, {"realtime", Pace::kRealTime}};
+inline void declare_identity(CLI::App& app, CommonOptions& options) {
   app.add_option("--artifact", options.artifact, "the controller, JSON or CBOR")->required();
   app.add_option("--session", options.session, "a number of your choice, the same on both sides")->required();
+}
+
+inline void declare_transport(CLI::App& app, CommonOptions& options) {
   app.add_option("--url", options.url, "LCM address")->capture_default_str();
   app.add_flag("--allow-network", options.allow_network, "accept a url with ttl > 0; messages are not authenticated");
+}
+
+inline CLI::Option* declare_priority(CLI::App& app, CommonOptions& options) {
+  app.add_option("--cpu", options.cpu, "stay on this core, 0, 1, ...")->check(CLI::NonNegativeNumber.description(""));
+  return app.add_option("--priority", options.priority, "lock memory and use SCHED_FIFO with this priority, 1..99")
+      ->check(CLI::Range(1, 99).description(""));
+}
+
+inline void declare(CLI::App& app, CommonOptions& options) {
+  static const std::map<std::string, Pace> kPaces{{"lockstep", Pace::kLockStep}, {"realtime", Pace::kRealTime}};
+  declare_identity(app, options);
+  declare_transport(app, options);
   app.add_option("--record", options.record, "write every sample to this CSV file");
   app.add_option("--mode", options.pace, "lockstep (default) or realtime")
       ->transform(CLI::CheckedTransformer(kPaces, CLI::ignore_case).description(""));
-  CLI::Option* priority =
-      app.add_option("--priority", options.priority, "lock memory and use SCHED_FIFO with this priority, 1..99")
-          ->check(CLI::Range(1, 99).description(""));
-  app.add_flag("--require-rt", options.require_realtime, "exit 4 if --priority cannot be had")->needs(priority);
+  app.add_flag("--require-rt", options.require_realtime, "exit 4 if --priority cannot be had")
+      ->needs(declare_priority(app, options));
   app.add_option("--timeout-s", options.timeout_s, "end the run after so long without the other side")
       ->check(CLI::PositiveNumber.description(""))
       ->capture_default_str();
@@ -84,9 +97,18 @@ class NoRealtime : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Enters real-time scheduling if `--priority` asks for it; true if all of it was granted. Warns once, or throws
-/// NoRealtime if it is required. INIT-ONLY: before any thread is created.
+/// Stays on the core of `--cpu`. INIT-ONLY: before any thread is created. Throws InputError if there is no such core.
+inline void apply_cpu(const CommonOptions& options) {
+  if (options.cpu >= 0 && !pin_to_cpu(options.cpu)) {
+    throw InputError("command line", "cpu", std::to_string(options.cpu), "a core that this process may use");
+  }
+}
+
+/// Pins the process to a core if `--cpu` asks for it and enters real-time scheduling if `--priority` does; true if all
+/// of the latter was granted. Warns once, or throws NoRealtime if it is required; throws InputError if there is no such
+/// core. INIT-ONLY: before any thread is created.
 inline bool apply_priority(const CLI::App& app, const CommonOptions& options) {
+  apply_cpu(options);
   if (options.priority == 0) {
     return false;
   }

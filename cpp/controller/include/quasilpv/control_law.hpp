@@ -22,6 +22,10 @@ class ControlLaw {
   /// Forgets all state. RT-SAFE (bounded, no allocation, no lock, no throw).
   virtual void reset() noexcept = 0;
 
+  /// Forgets all state but continues from the torque in force, N m: Limiter::take_over(). RT-SAFE (bounded, no
+  /// allocation, no lock, no throw).
+  virtual void take_over(const JointArray& in_force, double ramp_s) noexcept = 0;
+
  protected:
   ControlLaw() = default;
 };

@@ -70,11 +70,17 @@ struct FailsafeAction {
 ///
 /// Ready becomes Running at the first sample. Any flag makes Running Degraded; the first sample without one makes it
 /// Running again. The limits of `settings` make it Fault, with the first cause that applies, and Fault stays Fault:
-/// only a new FailsafeState leaves it. RT-SAFE (bounded, no allocation, no lock, no throw).
+/// only after_reset() leaves it. RT-SAFE (bounded, no allocation, no lock, no throw).
 ///
 /// @param now_ns  any monotonic clock; simulated time in lock-step
 FailsafeState next_state(const FailsafeSettings& settings, const FailsafeState& state, const FailsafeFlags& flags,
                          std::int64_t now_ns) noexcept;
+
+/// An explicit reset: Fault becomes Ready if `flags`, those of the last sample, hold no reason to stay, that is no
+/// cause of a fault and a valid measurement. Otherwise, and outside Fault, `state` is returned as it is. The time
+/// outside the premise box starts anew. RT-SAFE (bounded, no allocation, no lock, no throw).
+FailsafeState after_reset(const FailsafeSettings& settings, const FailsafeState& state,
+                          const FailsafeFlags& flags) noexcept;
 
 /// What `state` asks for at `now_ns`. RT-SAFE (bounded, no allocation, no lock, no throw).
 FailsafeAction action_of(const FailsafeSettings& settings, const FailsafeState& state, std::int64_t now_ns) noexcept;

@@ -14,8 +14,8 @@ struct TorqueLimits {
 };
 
 /// In this fixed order: finite check, saturation to +-torque_nm, limit of the change since the last applied torque to
-/// slew_nm_per_s * T, finite check. The first torque has no predecessor and is only saturated, so that a start with the
-/// hold torque is bumpless.
+/// slew_nm_per_s * T, finite check. The first torque has no predecessor and is only saturated, unless take_over() gave
+/// it one.
 class Limiter {
  public:
   /// INIT-ONLY.
@@ -28,17 +28,28 @@ class Limiter {
   /// \returns kTorqueSaturated, kSlewLimited and kTorqueNotFinite bits of StepFlag.
   std::uint32_t apply(const JointArray& commanded, JointArray& applied) noexcept;
 
+  /// The same if `commanded`; otherwise the plant holds the last torque, and so does this. RT-SAFE.
+  std::uint32_t apply(const JointArray& torque, bool commanded, JointArray& applied) noexcept;
+
   /// The torque applied last, zero before the first. RT-SAFE.
   const JointArray& last_applied() const noexcept { return last_; }
 
   /// Forgets the last torque. RT-SAFE.
   void reset() noexcept;
 
+  /// Begins at a torque that is already in force, for a start without a bump: for `ramp_s` from now on no sample
+  /// changes the torque by more than 2 torque_nm T / ramp_s either, so that the whole range is within reach at its end.
+  /// RT-SAFE. \param in_force N m, finite; saturated here. \param ramp_s   0: only the slew limit holds.
+  void take_over(const JointArray& in_force, double ramp_s) noexcept;
+
  private:
   bool is_finite(const JointArray& torque) const noexcept;
 
   TorqueLimits limits_;
+  double sample_period_s_;
   JointArray max_change_{};
+  JointArray ramp_change_{};
+  std::int64_t ramp_samples_left_ = 0;
   std::size_t joints_;
   JointArray last_{};
   bool started_ = false;

@@ -1,6 +1,7 @@
 // Controller and plant talk through a Link: LCM between two processes, queues within one.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -18,8 +19,9 @@ struct LinkCounters {
   std::int64_t wrong_type = 0;
   std::int64_t wrong_session = 0;
   std::int64_t wrong_artifact = 0;     ///< hash or number of joints differ
-  std::int64_t consecutive_wrong = 0;  ///< packets of a wrong session or artifact since the last accepted one
+  std::int64_t consecutive_wrong = 0;  ///< packets of a wrong session or artifact since the last right one
   std::int64_t superseded = 0;         ///< accepted, but a newer one arrived before it was taken
+  std::int64_t lost_events = 0;        ///< accepted, but more were waiting than are kept
   std::int64_t send_failures = 0;
 };
 
@@ -50,7 +52,13 @@ class Link {
   /// be taken again: lock-step answers it. RT-SAFE.
   bool take(measurement_v1& message) noexcept { return measurement_.take(message); }
   bool take(command_v1& message) noexcept { return command_.take(message); }
-  bool take(event_v1& message) noexcept { return event_.take(message); }
+
+  /// Takes the oldest event out: each of them counts, so they are kept in order, at most 8. RT-SAFE.
+  bool take(event_v1& event) noexcept { return events_.take(event); }
+
+  /// Longest run of packets of a wrong session or artifact that touched the time since the last call. A right packet
+  /// that ends such a run does not hide it. RT-SAFE.
+  std::int64_t take_longest_wrong_run() noexcept;
 
   const LinkCounters& counters() const noexcept { return counters_; }
   const WireIdentity& identity() const noexcept { return identity_; }
@@ -83,6 +91,17 @@ class Link {
     bool fresh = false;
   };
 
+  struct EventQueue {
+    static constexpr std::size_t kCapacity = 8;
+
+    bool put(const event_v1& event) noexcept;
+    bool take(event_v1& event) noexcept;
+
+    std::array<event_v1, kCapacity> events{};
+    std::size_t first = 0;
+    std::size_t count = 0;
+  };
+
   template <class Message>
   void seal_and_transmit(Message message) noexcept;
   template <class Message>
@@ -95,9 +114,10 @@ class Link {
   Side side_;
   WireIdentity identity_;
   LinkCounters counters_;
+  std::int64_t longest_wrong_run_ = 0;
   Inbox<measurement_v1> measurement_;
   Inbox<command_v1> command_;
-  Inbox<event_v1> event_;
+  EventQueue events_;
   Packet packet_;
 };
 

@@ -1,4 +1,4 @@
-// The controller between two messages: measurement in, command and telemetry out. No transport, no waiting.
+// The controller between reading and command, with its policy and its telemetry. No transport, no waiting.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +7,10 @@
 #include "quasilpv/controller.hpp"
 #include "quasilpv/failsafe.hpp"
 #include "quasilpv/latency_histogram.hpp"
-#include "quasilpv/messages.hpp"
+#include "quasilpv/post_mortem.hpp"
+#include "quasilpv/robot.hpp"
 #include "quasilpv/safe_torque.hpp"
+#include "quasilpv/telemetry_ring.hpp"
 #include "quasilpv/trajectory.hpp"
 
 namespace quasilpv {
@@ -17,46 +19,63 @@ struct LoopSettings {
   FailsafeSettings failsafe;
   SafeAction safe_action = SafeAction::kZero;
   bool realtime = false;  ///< memory locked and SCHED_FIFO, as telemetry reports it
+  /// Begin at the hold torque G(y) of the first valid reading and leave it over `ramp_s` (Limiter::take_over()), so
+  /// that a start away from the reference, or while the arm moves, is free of bumps. Off: the first torque is the
+  /// law's.
+  bool bumpless_start = false;
+  double ramp_s = 0.1;  ///< of a bumpless start, and of the way out of a fault after a reset
 };
 
 /// What only the caller can know about a sample.
 struct SampleConditions {
   std::int64_t now_ns = 0;                ///< clock of the fail-safe policy: monotonic, or seq T in lock-step
   std::int64_t consecutive_overruns = 0;  ///< samples before this one that took longer than their period
-  std::int64_t consecutive_foreign = 0;   ///< LinkCounters::consecutive_wrong
+  std::int64_t consecutive_foreign = 0;   ///< Robot::take_longest_foreign_run()
   bool stop_requested = false;
 };
 
-/// Turns the measurement of sample k into the command of sample k:
+/// Turns the reading of sample k into the command of sample k:
 ///
-/// 1. for every sample missing since the last one, a step without measurement (the observer predicts); at most
-///    `invalid_limit` of them, because so many latch a fault anyway;
+/// 1. for every sample missing since the last one, a step without measurement (the observer predicts with the torque
+///    that the robot held); at most `invalid_limit` of them, because so many latch a fault anyway;
 /// 2. reference r(k T), control step, fail-safe policy; in Fault the safe torque replaces the law's.
 ///
-/// The command depends on the sequence of measurements and on SampleConditions only.
+/// Every step, the predicted ones too, leaves a telemetry sample. The command depends on the sequence of readings and
+/// on SampleConditions only.
 class ControlLoop {
  public:
   /// INIT-ONLY. Throws InputError if artifact and trajectory differ in the number of joints.
   ControlLoop(const Artifact& artifact, const Trajectory& trajectory, const LoopSettings& settings);
 
+  /// Where telemetry goes; null (at first): nowhere. `ring` must outlive the loop. INIT-ONLY.
+  void publish_to(SampleRing* ring) noexcept { ring_ = ring; }
+
   /// Whether `seq` is newer than the last sample answered: only those may be handled. RT-SAFE.
   bool is_new(std::int64_t seq) const noexcept { return seq > last_seq_; }
 
-  /// Handles a new measurement; afterwards command() and telemetry() are those of its sample. RT-SAFE (bounded, no
-  /// allocation, no lock, no throw).
-  void handle(const measurement_v1& measurement, const SampleConditions& conditions) noexcept;
+  /// Handles a new reading; afterwards command() is that of its sample. RT-SAFE (bounded, no allocation, no lock, no
+  /// throw).
+  void handle(const RobotReading& reading, const SampleConditions& conditions) noexcept;
 
   /// The next sample without a measurement, because the plant is silent: latches a fault and moves the command towards
   /// the safe torque. RT-SAFE (bounded, no allocation, no lock, no throw).
   void handle_silence(const SampleConditions& conditions) noexcept;
 
-  const command_v1& command() const noexcept { return command_; }
-  telemetry_v1& telemetry() noexcept { return telemetry_; }
+  /// An explicit reset, to be asked for by a person: leaves a latched fault if nothing speaks against it
+  /// (after_reset()). The law starts afresh at the next valid reading, from the torque in force. Returns whether the
+  /// fault was left. RT-SAFE (bounded, no allocation, no lock, no throw).
+  bool reset_fault() noexcept;
+
+  const RobotCommand& command() const noexcept { return command_; }
+
+  /// The last samples before the last fault; empty if there was none.
+  const PostMortem& post_mortem() const noexcept { return post_mortem_; }
 
   /// Ready until the first measurement. RT-SAFE, as all that follow.
   ControllerState state() const noexcept { return failsafe_.state; }
   FaultCause cause() const noexcept { return failsafe_.cause; }
   bool started() const noexcept { return last_seq_ >= 0; }
+  std::int64_t faults() const noexcept { return faults_; }  ///< latched so far, those left by a reset included
   /// Whether the ramp to the safe torque is over at `now_ns`.
   bool is_safe(std::int64_t now_ns) const noexcept;
 
@@ -69,6 +88,7 @@ class ControlLoop {
   int joints() const noexcept { return controller_.joints(); }
 
  private:
+  void begin_without_a_bump(const JointArray& angle) noexcept;
   void step(const StepInput& input, const SampleConditions& conditions, bool plant_silent) noexcept;
   void predict_missing(std::int64_t next_seq, const SampleConditions& conditions) noexcept;
   void judge(const StepReport& report, const SampleConditions& conditions, bool plant_silent) noexcept;
@@ -80,12 +100,17 @@ class ControlLoop {
   LoopSettings settings_;
   SafeTorque safe_torque_;
   FailsafeState failsafe_;
-  command_v1 command_{};
+  FailsafeFlags observed_;
+  RobotCommand command_;
   telemetry_v1 telemetry_{};
+  SampleRing* ring_ = nullptr;
+  PostMortem post_mortem_;
   JointArray last_torque_{};
   JointArray torque_at_fault_{};
   JointArray last_valid_angle_{};
   std::int64_t last_seq_ = -1;
+  bool begun_ = false;  // a valid reading was there
+  std::int64_t faults_ = 0;
   std::int64_t consecutive_invalid_ = 0;
   std::int64_t predicted_steps_ = 0;
   std::uint32_t flags_ = kStepHealthy;

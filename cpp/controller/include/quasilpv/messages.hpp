@@ -30,13 +30,14 @@ constexpr Channel channel_of(const telemetry_v1& /*type*/) noexcept { return Cha
 constexpr Channel channel_of(const event_v1& /*type*/) noexcept { return Channel::kEvent; }
 
 /// Who sent an event (`event_v1::source`).
-enum class Side : std::int32_t { kController = 1, kPlant = 2 };
+enum class Side : std::int32_t { kController = 1, kPlant = 2, kOperator = 3 };
 
 /// What happened (`event_v1::code`).
 enum class EventCode : std::int32_t {
   kStarted = 1,  ///< the sender entered its loop
   kEnded = 2,    ///< the run is over: from the plant after its last sample, from the controller when it stops
-  kFault = 3     ///< the controller latched a fault; detail[0] is its FaultCause
+  kFault = 3,    ///< the controller latched a fault; detail[0] is its FaultCause
+  kReset = 4     ///< asks the controller to leave a latched fault
 };
 
 /// Whose messages these are. A message of another session, artifact or number of joints is ignored and counted.

@@ -27,12 +27,17 @@ struct RealtimeStatus {
   bool complete() const noexcept { return memory_locked && fifo; }
 };
 
-/// Locks all present and future memory and puts the calling thread, and the threads it creates from then on, into
-/// SCHED_FIFO with the given priority (1..99). INIT-ONLY. Without the privilege the status says so; nothing is thrown.
+/// Locks all present and future memory, touches the stack once so that no page of it is missing later, and puts the
+/// calling thread, and the threads it creates from then on, into SCHED_FIFO with the given priority (1..99). INIT-ONLY.
+/// Without the privilege the status says so; nothing is thrown.
 RealtimeStatus enter_realtime(int priority) noexcept;
 
-/// Takes the calling thread back to normal scheduling. INIT-ONLY.
+/// Takes the calling thread back to normal scheduling, on any core the process had at its start. INIT-ONLY.
 void leave_realtime() noexcept;
+
+/// Keeps the calling thread, and the threads it creates from then on, on one core. False if there is no such core for
+/// this process. INIT-ONLY.
+bool pin_to_cpu(int cpu) noexcept;
 
 /// Set by SIGINT and SIGTERM once the handlers are installed, which interrupt a sleep or a wait. INIT-ONLY.
 const std::atomic<bool>& install_stop_signals() noexcept;

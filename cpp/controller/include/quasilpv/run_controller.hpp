@@ -5,10 +5,9 @@
 #include <cstdint>
 
 #include "quasilpv/latency_histogram.hpp"
-#include "quasilpv/link.hpp"
 #include "quasilpv/loop.hpp"
 #include "quasilpv/pacer.hpp"
-#include "quasilpv/telemetry_publisher.hpp"
+#include "quasilpv/robot.hpp"
 
 namespace quasilpv {
 
@@ -21,7 +20,7 @@ struct ControllerRunSettings {
 
 /// How a run ended.
 enum class ControllerRunEnd {
-  kPlantEnded,      ///< the plant said so
+  kPlantEnded,      ///< the robot's side said so
   kStopped,         ///< SIGINT or SIGTERM; the safe torque was sent
   kFault,           ///< `exit_on_fault`
   kPlantSilent,     ///< no measurement for `timeout_s`
@@ -34,20 +33,20 @@ struct ControllerRunReport {
   ControllerRunEnd end = ControllerRunEnd::kPlantNeverHeard;
   std::int64_t commands = 0;           ///< sent, repeated ones included
   std::int64_t repeated = 0;           ///< lock-step: answered again
+  std::int64_t resets = 0;             ///< faults left on request
   std::int64_t deadline_overruns = 0;  ///< real time: answered later than one period after its arrival
-  LatencyHistogram arrival;            ///< measurement sent (plant's clock) to wake-up; meaningful on one machine only
+  LatencyHistogram arrival;            ///< RobotReading::taken_ns to wake-up; meaningful on one machine only
   LatencyHistogram response;           ///< wake-up to command sent
 };
 
-/// Answers measurements until the run ends. Lock-step: one command per measurement, the same one again for a repeated
-/// measurement. Real time: the newest measurement only, never two commands for one measurement; when the plant has been
-/// silent for `silence_s`, a latched fault and the safe torque on the grid of the sample period. A stop request ramps
-/// to the safe torque, for at most 100 ms, and ends the run. No wait is longer than 10 ms. Never throws; the control
-/// path (handle, send, push) allocates nothing.
+/// Answers readings until the run ends. Lock-step: one command per reading, the same one again for a repeated reading.
+/// Real time: the newest reading only, never two commands for one reading; when the robot has been silent for
+/// `silence_s`, a latched fault and the safe torque on the grid of the sample period. A stop request ramps to the safe
+/// torque, for at most 100 ms, and ends the run. No wait is longer than 10 ms. Never throws; the control path (read,
+/// handle, write, telemetry) allocates nothing itself.
 ///
-/// @param ring  telemetry of every answered sample; may be null
 /// @param stop  set by a signal handler or another thread
-ControllerRunReport run_controller(ControlLoop& loop, Link& link, TelemetryPublisher::Ring* ring,
-                                   const ControllerRunSettings& settings, const std::atomic<bool>& stop) noexcept;
+ControllerRunReport run_controller(ControlLoop& loop, Robot& robot, const ControllerRunSettings& settings,
+                                   const std::atomic<bool>& stop) noexcept;
 
 }  // namespace quasilpv

@@ -4,8 +4,10 @@
 #include <ostream>
 
 #include "quasilpv/document.hpp"
+#include "quasilpv/failsafe.hpp"
 #include "quasilpv/latency_histogram.hpp"
 #include "quasilpv/link.hpp"
+#include "quasilpv/post_mortem.hpp"
 
 namespace quasilpv {
 
@@ -25,6 +27,10 @@ Json to_json(const LatencyHistogram& histogram);
 
 /// One member per counter.
 Json to_json(const LinkCounters& counters);
+
+/// `{cause, seq: [...], state: [...], ..., torque_nm: [[...] per sample]}` of the samples before a fault, null without
+/// one.
+Json to_json(const PostMortem& post_mortem, FaultCause cause, int joints);
 
 /// One line of JSON, or a table of two columns: path of the member, value.
 void print_report(std::ostream& out, const Json& report, bool as_json);

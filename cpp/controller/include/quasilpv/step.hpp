@@ -22,7 +22,8 @@ struct Reference {
 /// Input of one step. `speed` is read only by laws that need a measured speed (PID, computed torque).
 struct StepInput {
   std::int64_t seq = 0;
-  bool valid = true;  ///< false: no usable measurement; the observer predicts and the step uses its prediction
+  bool valid = true;      ///< false: no usable measurement; the observer predicts and the step uses its prediction
+  bool commanded = true;  ///< false: the torque of this step reaches nobody, the plant holds the last one
   JointArray angle{};
   JointArray speed{};
   Reference reference{};

@@ -27,7 +27,7 @@ struct TelemetryReport {
 /// control thread pushes.
 class TelemetryPublisher {
  public:
-  using Ring = TelemetryRing<telemetry_v1, 4096>;
+  using Ring = SampleRing;
 
   /// Starts the thread, which runs at normal priority. INIT-ONLY. Throws InputError if the record cannot be created.
   ///

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "quasilpv/telemetry_v1.hpp"
+
 namespace quasilpv {
 
 /// Single-producer, single-consumer ring (Lamport 1983, with each side caching the other's index). Both operations are
@@ -65,5 +67,8 @@ class TelemetryRing {
   std::size_t cached_tail_ = 0;
   alignas(kCacheLine) std::array<Element, Capacity> elements_{};
 };
+
+/// The telemetry of a run on its way out: four seconds of samples at 1 kHz.
+using SampleRing = TelemetryRing<telemetry_v1, 4096>;
 
 }  // namespace quasilpv

@@ -1,0 +1,20 @@
+// A person asks a running controller to leave its latched fault.
+#pragma once
+
+#include "quasilpv/link.hpp"
+
+namespace quasilpv {
+
+enum class ResetOutcome {
+  kLeft,        ///< a command with another state than Fault came after the request
+  kStillFault,  ///< commands came, all of them in Fault: its cause is still there
+  kSilent       ///< no command: no controller of this session
+};
+
+/// Sends the reset event of the link's session, again every 100 ms, until the controller's commands say that the fault
+/// was left or `timeout_s` passed. A controller of another session ignores it. RT-UNSAFE.
+///
+/// @param link  the operator's end (Side::kOperator): hears what the plant hears
+ResetOutcome request_reset(Link& link, double timeout_s);
+
+}  // namespace quasilpv
