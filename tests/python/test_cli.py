@@ -291,7 +291,7 @@ def test_when_nothing_is_chosen_expect_all_default_controllers_and_a_coarse_enco
         wanted.append(variant)
         return read_artifact(tmp_path / "a.json")
 
-    monkeypatch.setattr("quasilpv.cli.track.designed", instead)
+    monkeypatch.setattr("quasilpv.cli.session.designed", instead)
     rows = json.loads(design("track", "serial-square", "--json").out)
     tuned = ("pid", "pid-tuned", "ctc", "ctc-tuned", "ctc-dob", "ctc-dob-tuned")
     expected = [*((name, 20) for name in (*tuned, "dob-torque", "dob-acceleration")), ("dob-acceleration", 17)]

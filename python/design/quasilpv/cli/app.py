@@ -40,6 +40,7 @@ Examples:
   design verify out/arm3/artifact.json
   design robust out/arm3/artifact.json
   design track serial-square serial-circle
+  design animate serial-square fivebar-spiral
   design hil serial-square --real-time
   design solve ex-I.1 --condition II.6 --set b=2.5
   design boundary ex-I.1 --condition II.6 --over b=0:30

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, cast
 
@@ -11,22 +10,21 @@ import typer
 
 from quasilpv.artifact import Artifact, read_artifact
 from quasilpv.artifact.files import write_readable_json
-from quasilpv.cli.console import JsonOption, Steps, print_json, print_note, progress
+from quasilpv.cli.console import JsonOption, print_json, progress
 from quasilpv.cli.options import (
     ArtifactOption,
     EncoderOption,
     PlantOption,
     RateOption,
-    designed,
     plant_kind,
     require_controller,
     sensors_of,
 )
 from quasilpv.cli.results import print_results
+from quasilpv.cli.session import Session, draw_results
 from quasilpv.errors import InputError
-from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, track, variant_of
-from quasilpv.figures.gallery import write_comparison, write_gallery
+from quasilpv.experiments.result import Variant
+from quasilpv.experiments.track import PlantKind, TrackingExperiment, variant_of
 from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
@@ -42,22 +40,6 @@ DEFAULT_CONTROLLERS = (
 )
 COARSE_ENCODER_BITS = 17
 PATH_ROBOT = "arm3"
-
-
-@dataclass(frozen=True)
-class _Session:
-    """What all runs of one command have in common."""
-
-    given: Artifact | None
-    rate_hz: float | None
-    plant: PlantKind
-    out: Path
-
-    def run(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> TrackResult:
-        artifact = self.given or designed(experiment.robot.id, variant, self.rate_hz, progress=steps.parts)
-        folder = self.out / experiment.name / variant.slug
-        sensors = sensors_of(variant.encoder_bits)
-        return track(experiment, artifact, folder, plant=self.plant, sensors=sensors, variant=variant)
 
 
 def track_command(
@@ -107,7 +89,7 @@ def track_command(
         raise InputError("command line", "SCENARIO", "nothing", "at least one scenario id or --trajectory FILE")
     given = None if artifact is None else _given(artifact, controllers, rate_hz, no_compensation)
     variants = _variants(given, controllers, encoder_bits, no_compensation)
-    session = _Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out)
+    session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out)
     results = []
     with progress(len(experiments) * len(variants)) as steps:
         for experiment in experiments:
@@ -117,7 +99,7 @@ def track_command(
                 steps.end()
     write_readable_json(out / "results.json", [result.row() for result in results])
     if not json if figures is None else figures:
-        _draw(results, out)
+        draw_results(results, out)
     if json:
         print_json([result.row() for result in results])
     else:
@@ -146,14 +128,3 @@ def _variants(
     if not controllers and encoder_bits is None:
         variants.append(Variant(DEFAULT_CONTROLLER, COARSE_ENCODER_BITS))
     return variants
-
-
-def _draw(results: Sequence[TrackResult], out: Path) -> None:
-    with progress(len(results)) as steps:
-        for result in results:
-            steps.begin(f"figures: {result.title}")
-            write_gallery(result, out / result.scenario / result.variant.slug)
-            steps.end()
-    for scenario in dict.fromkeys(result.scenario for result in results):
-        write_comparison([result for result in results if result.scenario == scenario], out / scenario)
-    print_note(f"figures are under {out}")

@@ -45,6 +45,7 @@ VERBS: Mapping[str, Verb] = {
     "robust": Verb("robust", "The robust gate: every posture, payload, small delay."),
     "export-sdp": Verb("export_sdp", "The semidefinite program behind a law, as a file."),
     "track": Verb("track", "Scenarios in closed loop: table and figures."),
+    "animate": Verb("animate", "Robots in motion, with and without compensation."),
     "hil": Verb("hil", "Controller and plant as two processes over LCM."),
     "solve": Verb("solve", "Whether a condition holds for a system."),
     "boundary": Verb("boundary", "Where a condition stops being feasible."),

@@ -150,11 +150,13 @@ class PlanarSerialArm(PlanarMechanism):
 
         ``X = sum L_k sin(alpha_k)``, ``Y = -sum L_k cos(alpha_k)`` (both negated when upright), ``Phi = alpha_n``.
         """
+        return np.array([*self.skeleton(theta)[-1], self.absolute(theta)[-1]])
+
+    def skeleton(self, theta: ArrayLike) -> Matrix:
+        """Base, joints and tool, (n + 1) x 2, m: partial sums of ``L_k (sin(alpha_k), -cos(alpha_k))``."""
         alpha = self.absolute(theta)
-        sign = self.equilibrium_sign
-        return np.array(
-            [sign * self.length_m @ np.sin(alpha), -sign * self.length_m @ np.cos(alpha), alpha[-1]],
-        )
+        links = self.equilibrium_sign * self.length_m * np.array([np.sin(alpha), -np.cos(alpha)])
+        return np.vstack([np.zeros(2), np.cumsum(links.T, axis=0)])
 
     def jacobian(self, theta: ArrayLike) -> Matrix:
         """Tool Jacobian, 3 x n: d(X, Y, Phi)/dt = J omega. For n = 3, det J = L_1 L_2 sin(theta_2)."""

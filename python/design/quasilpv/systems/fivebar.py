@@ -98,6 +98,10 @@ class RhombicFiveBar(PlanarMechanism):
         """The velocity part of the tool acceleration, (dJ/dt) omega, 2, m/s^2."""
         return self.linkage.tool_drift(theta, omega)
 
+    def skeleton(self, theta: ArrayLike) -> Matrix:
+        """Motors, first elbow, tool, second elbow, motors: 5 x 2, m."""
+        return self.linkage.skeleton(theta)
+
     def singularity(self, theta: ArrayLike) -> tuple[str, float]:
         """See `FiveBarLinkage.singularity`; of a rhombus all of its sines are that of theta_2 - theta_1."""
         return self.linkage.singularity(theta)

@@ -192,6 +192,12 @@ class FiveBarLinkage:
         phi = self.coordinates(theta)
         return self.active.length_m * _towards(phi[0]) + self.passive.length_m * _towards(phi[2])
 
+    def skeleton(self, theta: ArrayLike) -> Matrix:
+        """Motors, first elbow, tool, second elbow, motors: 5 x 2, m."""
+        motors = np.zeros(2)
+        first, second = (self.active.length_m * _towards(angle) for angle in np.asarray(theta, dtype=float))
+        return np.array([motors, first, self.tool_position(theta), second, motors])
+
     def driven_angles(self, position: ArrayLike) -> Vector:
         """(theta_1, theta_2) that put the tool at (X, Y), in this linkage's assembly.
 

@@ -112,6 +112,10 @@ class PlanarMechanism(ABC):
         """The velocity part of the tool acceleration, (dJ/dt) omega."""
 
     @abstractmethod
+    def skeleton(self, theta: ArrayLike) -> Matrix:
+        """The links as one line from the base through the joints, points x 2, m: what a drawing of the robot shows."""
+
+    @abstractmethod
     def singularity(self, theta: ArrayLike) -> tuple[str, float]:
         """A quantity in [0, 1] that vanishes at singular configurations, with its name."""
 

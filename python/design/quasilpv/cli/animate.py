@@ -1,0 +1,83 @@
+"""``design animate``: robots in motion, with and without compensation of the disturbance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import typer
+
+from quasilpv.cli.console import JsonOption, Steps, print_json, print_note, progress
+from quasilpv.cli.options import EncoderOption, PlantOption, RateOption, plant_kind
+from quasilpv.cli.results import print_results
+from quasilpv.cli.session import Session, draw_results
+from quasilpv.experiments.result import TrackResult, Variant
+from quasilpv.experiments.track import PlantKind, TrackingExperiment
+from quasilpv.figures.animation import write_animation
+from quasilpv.scenarios import ENCODER_BITS
+from quasilpv.synthesis import DEFAULT_CONTROLLER
+
+DEFAULT_SCENARIOS = ("serial-square", "serial-circle", "fivebar-spiral")
+FILE_NAME = "animation.gif"
+
+
+def animate_command(
+    scenarios: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="SCENARIO...",
+            help=f"Scenario ids, see design list.  [default: {', '.join(DEFAULT_SCENARIOS)}]",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    rate_hz: RateOption = None,
+    encoder_bits: EncoderOption = None,
+    plant: PlantOption = "perturbed",
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for animations, run files and figures.")
+    ] = Path("out/animate"),
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures of every run too.")] = True,
+    json: JsonOption = False,
+) -> None:
+    """Run scenarios with the default controller, with and without compensation of the disturbance it observes.
+
+    Writes an animation (GIF, real time) per scenario that shows both runs side by side, and the figures of every run.
+
+    \b
+    Example:
+      design animate serial-square fivebar-spiral --rate-hz 2000
+    """
+    experiments = [TrackingExperiment.registered(name) for name in dict.fromkeys(scenarios or DEFAULT_SCENARIOS)]
+    bits = ENCODER_BITS if encoder_bits is None else encoder_bits
+    variants = [Variant(DEFAULT_CONTROLLER, bits, compensated) for compensated in (False, True)]
+    session = Session(None, rate_hz, cast(PlantKind, plant_kind(plant)), out)
+    results: list[TrackResult] = []
+    made: list[dict[str, Any]] = []
+    with progress(len(experiments) * (len(variants) + 1)) as steps:
+        for experiment in experiments:
+            pair = []
+            for variant in variants:
+                steps.begin(f"{experiment.name}: {variant.label}")
+                pair.append(session.run(experiment, variant, steps))
+                steps.end()
+            made.append(_animate(session, experiment, pair, steps))
+            results += pair
+    if figures:
+        draw_results(results, out)
+    if json:
+        print_json(made)
+        return
+    print_results(results)
+    for entry in made:
+        print_note(f"wrote {entry['animation']}")
+
+
+def _animate(session: Session, experiment: TrackingExperiment, pair: list[TrackResult], steps: Steps) -> dict[str, Any]:
+    """Write the animation of a scenario; its entry of ``--json``."""
+    steps.begin(f"{experiment.name}: animation")
+    path = session.out / experiment.name / FILE_NAME
+    robot = experiment.robot.with_payload_fraction(1.0 if session.plant == "perturbed" else 0.0)
+    frames = write_animation(pair, robot, path, steps.parts)
+    steps.end()
+    return {"animation": str(path), "frames": frames, "runs": [result.row() for result in pair]}

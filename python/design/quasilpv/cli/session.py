@@ -1,0 +1,50 @@
+"""Runs of the verbs that track scenarios in this process, and their figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from quasilpv.artifact import Artifact
+from quasilpv.cli.console import Steps, print_note, progress
+from quasilpv.cli.options import designed, sensors_of
+from quasilpv.experiments.result import TrackResult, Variant
+from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
+from quasilpv.figures.gallery import write_comparison, write_gallery
+
+
+@dataclass(frozen=True)
+class Session:
+    """What all runs of one command have in common.
+
+    Attributes:
+        given: the controller of every run; None to design one for each.
+        rate_hz: sample rate of designs; None for that of the controller.
+        plant: the true plant.
+        out: folder of all runs.
+    """
+
+    given: Artifact | None
+    rate_hz: float | None
+    plant: PlantKind
+    out: Path
+
+    def run(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> TrackResult:
+        """Design, if no controller is given, and run one variant in closed loop."""
+        artifact = self.given or designed(experiment.robot.id, variant, self.rate_hz, progress=steps.parts)
+        folder = self.out / experiment.name / variant.slug
+        sensors = sensors_of(variant.encoder_bits)
+        return track(experiment, artifact, folder, plant=self.plant, sensors=sensors, variant=variant)
+
+
+def draw_results(results: Sequence[TrackResult], out: Path) -> None:
+    """Draw every run, and all runs of a scenario beside each other."""
+    with progress(len(results)) as steps:
+        for result in results:
+            steps.begin(f"figures: {result.title}")
+            write_gallery(result, out / result.scenario / result.variant.slug)
+            steps.end()
+    for scenario in dict.fromkeys(result.scenario for result in results):
+        write_comparison([result for result in results if result.scenario == scenario], out / scenario)
+    print_note(f"figures are under {out}")

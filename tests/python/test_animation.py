@@ -1,0 +1,119 @@
+"""Animations: what is drawn is the plant, what moves moves, and the texts can be read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from PIL import Image
+
+from quasilpv.cli import run
+from quasilpv.errors import InputError
+from quasilpv.experiments.metrics import compute_metrics
+from quasilpv.experiments.result import TrackResult, Variant
+from quasilpv.experiments.run import FloatArray
+from quasilpv.figures.animation import FRAMES_PER_SECOND, LAST_FRAME_S, Film, write_animation
+from quasilpv.systems.mechanism import PlanarMechanism
+from quasilpv.systems.registry import robot
+from reference.readable import assert_readable
+from reference.runs import synthetic_result
+
+ROBOTS = ("arm2", "arm2-upright", "arm3", "fivebar")
+POSTURE = {"fivebar": np.array([-0.8, 0.7])}
+
+
+def motion(mechanism: PlanarMechanism, name: str) -> FloatArray:
+    """Angles (samples, n) about a regular posture of a robot."""
+    centre = POSTURE.get(name, np.full(mechanism.joints, 0.4))
+    return centre + 0.2 * np.sin(np.linspace(0.0, 2.0, 1000))[:, None]
+
+
+def pair_of_results(name: str, error_rad: float = 1e-4) -> list[TrackResult]:
+    """Two runs of a second, the second one with a hundredth of the error of the first."""
+    mechanism = robot(name).model
+    reference = motion(mechanism, name)
+
+    def tool(angle: FloatArray) -> FloatArray:
+        return np.array([mechanism.forward_kinematics(row)[:2] for row in angle])
+
+    def result(compensated: bool, error: float) -> TrackResult:
+        plain = synthetic_result(Variant("dob-acceleration", compensated=compensated), mechanism.joints, 1000)
+        record = replace(
+            plain.run, reference_angle_rad=reference, true_angle_rad=reference + error * np.sin(30 * reference)
+        )
+        return replace(
+            plain,
+            run=record,
+            metrics=compute_metrics(record, tool),
+            tool_position_m=tool(record.true_angle_rad),
+            reference_position_m=tool(reference),
+        )
+
+    return [result(False, error_rad), result(True, 0.01 * error_rad)]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_when_a_robot_is_drawn_expect_links_of_its_lengths_that_end_at_the_tool(name: str) -> None:
+    plant = robot(name).with_payload_fraction(1.0)
+    links = plant.parameters_document().get("links")
+    lengths = [link["length_m"] for link in links] if links else [0.165] * 4
+    for theta in motion(plant, name)[::100]:
+        points = plant.skeleton(theta)
+        assert_allclose(np.linalg.norm(np.diff(points, axis=0), axis=1), lengths, rtol=1e-12)
+        assert_allclose(points[0], 0.0, atol=1e-15)
+        tool = points[-1] if links else points[2]
+        assert_allclose(tool, plant.forward_kinematics(theta)[:2], atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_when_an_animation_is_drawn_expect_no_text_cut_or_over_another(name: str) -> None:
+    film = Film(pair_of_results(name), robot(name).model)
+    film.draw(0.5)
+    assert_readable(film.figure)
+
+
+def test_when_an_animation_is_written_expect_real_time_and_motion_in_every_panel(tmp_path: Path) -> None:
+    drawn: list[tuple[int, int]] = []
+    path = tmp_path / "new" / "arm.gif"
+    frames = write_animation(pair_of_results("arm3"), robot("arm3").model, path, lambda *step: drawn.append(step))
+    with Image.open(path) as image:
+        assert image.n_frames == frames == len(drawn) == drawn[-1][1]
+        assert image.info["loop"] == 0
+        pixels, durations_ms = [], []
+        for frame in range(frames):
+            image.seek(frame)
+            durations_ms.append(image.info["duration"])
+            pixels.append(np.asarray(image.convert("L"), dtype=float))
+    assert frames == 1 + round(0.999 * FRAMES_PER_SECOND)
+    assert sum(durations_ms) == 1000 * (frames - 1) // FRAMES_PER_SECOND + 1000 * LAST_FRAME_S
+    change = np.abs(pixels[-1] - pixels[0])
+    height, width = change.shape
+    upper, lower = change[: 2 * height // 3], change[2 * height // 3 :]
+    assert lower.max() > 50
+    assert all(panel.max() > 50 for panel in np.array_split(upper[height // 8 :], 4, axis=1)), width
+
+
+def test_when_a_run_has_no_error_expect_it_drawn() -> None:
+    film = Film(pair_of_results("arm3", error_rad=0.0), robot("arm3").model)
+    assert film.draw(0.2).size == film.draw(0.4).size
+
+
+def test_when_an_animation_cannot_be_written_expect_an_input_error(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="file"):
+        write_animation(pair_of_results("arm2"), robot("arm2").model, tmp_path / "file" / "arm.gif")
+
+
+@pytest.mark.full
+def test_when_animated_from_the_command_line_expect_both_runs_and_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["animate", "fivebar-spiral", "--no-figures", "--rate-hz", "2000"]) == 0
+    table = capsys.readouterr().out
+    assert table.count("dob-acceleration") == 2
+    assert "no compensation" in table
+    assert (tmp_path / "out/animate/fivebar-spiral/animation.gif").stat().st_size > 100_000
