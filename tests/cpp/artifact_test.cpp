@@ -147,6 +147,16 @@ TEST(Artifact, refuses_gain_tables_of_another_shape_or_another_schedule_than_the
   EXPECT_THAT(refused("/law/filter_time_constant_s", 0, "dob-torque"), HasSubstr("law.filter_time_constant_s: got 0"));
 }
 
+TEST(Artifact, refuses_a_premultiplication_that_is_null_or_scheduled_otherwise) {
+  Json table = artifact_table("dob-torque", 3);
+  table["law"]["premultiplication"] = table["law"]["inertia"];
+  EXPECT_NO_THROW((void)Artifact::parse(json_twin(table), "a.json"));
+  EXPECT_THAT(refused("/law/premultiplication", nullptr, "dob-torque"),
+              HasSubstr("a.json: law.premultiplication: got null, expected an object"));
+  EXPECT_THAT(refused("/law/premultiplication", table["law"]["feedback"], "dob-torque"),
+              HasSubstr("a.json: law.premultiplication.blocks[0].vertices[0]"));
+}
+
 TEST(Artifact, refuses_a_lyapunov_matrix_of_another_shape_or_that_is_not_symmetric_and_positive_definite) {
   EXPECT_THAT(refused("/law/lyapunov/8", {1.0, 2.0, 3.0}, "hinf-tracking"),
               HasSubstr("a.json: law.lyapunov[8]: got an array of 3"));

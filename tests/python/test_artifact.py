@@ -319,6 +319,39 @@ def test_when_a_gain_table_does_not_fit_the_inertia_expect_it_named(
     assert (error.value.field, message in str(error.value)) == (field, True)
 
 
+def premultiplied() -> dict:
+    document = arm3_document("dob-torque")
+    table = copy.deepcopy(document["law"]["inertia"])
+    for block in table["blocks"]:
+        block["vertices"] = [np.triu(vertex).tolist() for vertex in block["vertices"]]
+    document["law"]["premultiplication"] = table
+    return document
+
+
+def test_when_a_law_is_premultiplied_or_not_expect_the_member_kept_or_absent() -> None:
+    document, without_it = premultiplied(), arm3_document("dob-torque")
+    law = Artifact.from_document(document).to_document()["law"]
+    assert law["premultiplication"] == document["law"]["premultiplication"]
+    assert "premultiplication" not in Artifact.from_document(without_it).to_document()["law"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (at("law", "premultiplication", value=None), "got null, expected a block polytope, or no member of this name"),
+        (at("law", "premultiplication", "upper", 1, value=0.99), "that of law.inertia"),
+        (at("law", "premultiplication", "blocks", 0, "vertices", 0, value=[[1.0]]), "vertices[1]: got another shape"),
+    ],
+)
+def test_when_a_premultiplication_breaks_a_rule_expect_it_named(change: Callable[[dict], None], message: str) -> None:
+    document = premultiplied()
+    change(document)
+    with pytest.raises(InputError) as error:
+        Artifact.from_document(document, "artifact.json")
+    assert error.value.field.startswith("law.premultiplication")
+    assert message in str(error.value)
+
+
 DELAYED = ("law", "lyapunov", "blocks", 1, "vertices", 0)
 
 

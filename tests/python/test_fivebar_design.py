@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import copy
 from functools import cache
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
 from flint import fmpq
 
 from quasilpv.artifact import Artifact
+from quasilpv.certificate import verify
 from quasilpv.certificate.exact_matrices import rational
 from quasilpv.certificate.gate import robust_gate
 from quasilpv.certificate.gate_data import loop_data
 from quasilpv.certificate.gate_margin import inertia_margin
+from quasilpv.errors import InputError
 from quasilpv.experiments.track import TrackingExperiment
+from quasilpv.loops.frozen_loop import FrozenLoop
+from quasilpv.loops.torque_law import TorqueLaw
 from quasilpv.release import release
 from quasilpv.synthesis import Specification
 from quasilpv.systems.fivebar import RhombicFiveBar
@@ -114,6 +120,77 @@ def test_when_the_torque_level_law_is_released_expect_its_premise_scheduled_and_
     assert evidence["gate"]["passed"]
 
 
+def premultiplied() -> dict[str, Any]:
+    return copy.deepcopy(released(4000.0, "dob-torque-premultiplied").content())
+
+
+def test_when_the_equations_are_premultiplied_expect_the_inertia_of_the_thesis_and_its_claims_verified() -> None:
+    """``M_a = c_4 [1, sin theta_1; 0, 1]`` (Dehak 2022, IV.5.2), at both ends of the premise."""
+    content = premultiplied()
+    law, evidence = content["law"], content["verification"]
+    (beta,), (inertia,) = law["premultiplication"]["blocks"], law["inertia"]["blocks"]
+    c4 = evidence["report"]["inertia_scale"] * ROBOT.model.driven_inertia[0]
+    ends = (law["inertia"]["lower"][0], law["inertia"]["upper"][0])
+    for sine, factor, M in zip(ends, beta["vertices"], inertia["vertices"], strict=True):
+        np.testing.assert_allclose(np.array(factor) @ M, c4 * np.array([[1.0, sine], [0.0, 1.0]]), rtol=1e-15)
+    low, high = np.sin(ROBOT.domain.angle_rad[0])
+    assert ends[0] < low < high < ends[1]
+    assert evidence["report"]["scheduled_premises"] == ["sin(theta_1)"]
+    assert evidence["certificate"]["verified"]
+    assert evidence["gate"]["passed"]
+    assert not evidence["gate"]["proved"]
+
+
+@pytest.mark.parametrize(
+    ("path", "factor", "claim"),
+    [
+        (("law", "premultiplication", "blocks", 0, "vertices", 0), -1.0, "premultiplication: invertible 0"),
+        (("law", "premultiplication", "blocks", 0, "vertices", 1), 1.5, "feedback: "),
+        (("law", "observer", "blocks", 0, "vertices", 0), 0.5, "observer: "),
+        (("domain", "angle_rad", 0), 1.1, "premise box: output 0 of premises"),
+    ],
+)
+def test_when_a_premultiplied_law_is_changed_expect_the_claim_that_fails(
+    path: tuple[Any, ...], factor: float, claim: str
+) -> None:
+    content = premultiplied()
+    part = content
+    for key in path[:-1]:
+        part = part[key]
+    part[path[-1]] = (factor * np.array(part[path[-1]])).tolist()
+    assert any(name.startswith(claim) for name in verify(content).failed)
+
+
+def test_when_a_premultiplied_inertia_varies_expect_it_refused() -> None:
+    content = premultiplied()
+    content["law"]["inertia"]["blocks"][0]["vertices"][0][0][0] *= 1.01
+    with pytest.raises(InputError, match="the same at every vertex"):
+        verify(content)
+
+
+def test_when_gains_are_premultiplied_too_expect_the_same_loop() -> None:
+    """``K = beta K_0``, ``L_3 = beta L_30``, ``L_4 = beta L_40``: the same law in other torque coordinates."""
+    n, period, rng = 2, 5e-4, np.random.default_rng(4)
+    inertia, plant = np.diag([0.004, 0.003]), np.array([[0.005, 0.001], [0.001, 0.004]])
+    beta = np.array([[1.0, -0.8], [0.0, 1.0]]) + 0.1 * rng.normal(size=(n, n))
+    stiffness = [-gain * inertia for gain in (3 * 60.0**2, 3 * 60.0, 60.0**3)]
+    correction = [gain * np.eye(n) for gain in (4 * 900.0, 6 * 900.0**2)]
+    torque = [gain * inertia for gain in (4 * 900.0**3, 900.0**4)]
+
+    def loop(factor: np.ndarray | None) -> FrozenLoop:
+        to = np.eye(n) if factor is None else factor
+        feedback = np.hstack([to @ gain for gain in stiffness])
+        observer = np.vstack([*correction, *(to @ gain for gain in torque)])
+        tables = (inertia[None], feedback[None], observer[None], None if factor is None else factor[None])
+        return FrozenLoop(TorqueLaw(period, 1e-3, *tables), plant[None], 0.3 * period)
+
+    plain, other = loop(None), loop(beta)
+    for name in ("disturbance_gains", "growth_rates"):
+        arguments = (50.0,) if name == "disturbance_gains" else ()
+        assert getattr(other, name)(*arguments) == pytest.approx(getattr(plain, name)(*arguments), rel=1e-6)
+    assert other.torque_activity([1e-6]) == pytest.approx(plain.torque_activity([1e-6]), rel=1e-9)
+
+
 # ---- closed loops ----------------------------------------------------------------------------------------------------
 
 
@@ -125,6 +202,12 @@ def test_when_the_disturbance_is_strong_expect_the_observer_to_make_the_error_fi
     strong = [(100.0, 50.0), (100.0, 50.0)]
     without, compensated = (rms(released(2000.0, compensated=on), strong, 0.25) for on in (False, True))
     assert np.all(without > 5.0 * compensated)
+
+
+def test_when_the_equations_are_premultiplied_expect_the_accuracy_of_the_thesis_at_4_khz() -> None:
+    """125/145 um are printed for a controller in continuous time (Dehak 2022, IV.5.2)."""
+    error = rms(released(4000.0, "dob-torque-premultiplied"), [(15.0, 50.0), (15.0, 5.0)], 0.25)
+    assert np.all(error < [2.0e-4, 2.0e-4])
 
 
 @pytest.mark.full

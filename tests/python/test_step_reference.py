@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -150,6 +150,22 @@ def dob_torque(
     return law, lambda: DobTorque(feedback.at, observer.at, 1e-3, arm.mass_matrix, arm.gravity_torque, fresh(output))
 
 
+def premultiplied_dob_torque(
+    arm: SerialArm, rng: np.random.Generator, output: OutputStage
+) -> tuple[dict[str, Any], Callable[[], Reference]]:
+    law, build = dob_torque(arm, rng, output)
+    affine = np.triu(near_one(len(arm.links), rng), 1)
+    affine[0] += np.eye(len(arm.links))
+    beta = Scheduled(affine, len(arm.links))
+
+    def premultiplied() -> Reference:
+        reference = build()
+        assert isinstance(reference, DobTorque)
+        return replace(reference, premultiplication=beta.at)
+
+    return {**law, "premultiplication": beta.table}, premultiplied
+
+
 def hinf_tracking(
     arm: SerialArm, rng: np.random.Generator, output: OutputStage
 ) -> tuple[dict[str, Any], Callable[[], Reference]]:
@@ -267,6 +283,7 @@ LAWS: dict[str, Builder] = {
     "dob-acceleration": dob_acceleration(compensate=True),
     "dob-acceleration without compensation": dob_acceleration(compensate=False),
     "dob-torque": dob_torque,
+    "dob-torque with a premultiplication": premultiplied_dob_torque,
     "hinf-tracking": hinf_tracking,
     "state-feedback": state_feedback,
     "descriptor-feedback": descriptor_feedback,
@@ -301,7 +318,7 @@ def step_both(controller: _runtime.Controller, reference: Reference, s: Sample) 
 def test_when_inputs_are_random_expect_the_step_of_the_formulas(name: str, joints: int, limits: str) -> None:
     rng = np.random.default_rng(20240 + joints)
     arm, numpy_arm = random_arm(joints, rng)
-    bounds = {"wide": (1e9, 1e15), "tight": (300.0, 4e4)}[limits]
+    bounds = {"wide": (1e12, 1e18), "tight": (300.0, 4e4)}[limits]
     output = OutputStage(np.full(joints, bounds[0]), np.full(joints, bounds[1]), SAMPLE_PERIOD_S)
     law, make_reference = LAWS[name](numpy_arm, rng, output)
     table = {"torque_nm": output.torque_nm.tolist(), "slew_nm_per_s": output.slew_nm_per_s.tolist()}

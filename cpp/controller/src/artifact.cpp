@@ -122,11 +122,16 @@ BlockPolytope parse_gains(const Field& field, const BlockPolytope& inertia, int 
 
 DobTorqueParameters parse_dob_torque(const Field& law, const Field& programs, int joints) {
   programs.only({"premises", "gravity"});
-  law.only({"kind", "feedback", "observer", "filter_time_constant_s", "inertia"});
+  law.only({"kind", "feedback", "observer", "filter_time_constant_s", "inertia", "premultiplication"});
   DesignModel model = parse_model(law, programs, joints);
   BlockPolytope feedback = parse_gains(law["feedback"], model.inertia, joints, 3 * joints);
   BlockPolytope observer = parse_gains(law["observer"], model.inertia, 4 * joints, joints);
-  return {std::move(model), std::move(feedback), std::move(observer), law["filter_time_constant_s"].positive()};
+  std::optional<BlockPolytope> premultiplication;
+  if (law.has("premultiplication")) {
+    premultiplication = parse_gains(law["premultiplication"], model.inertia, joints, joints);
+  }
+  return {std::move(model), std::move(feedback), std::move(observer), law["filter_time_constant_s"].positive(),
+          std::move(premultiplication)};
 }
 
 Eigen::MatrixXd parse_lyapunov(const Field& field, int size) {

@@ -1,6 +1,8 @@
 // Gain-scheduled tracking with a disturbance observer in torque coordinates: the law of Theorem IV.11.
 #pragma once
 
+#include <optional>
+
 #include "observer_law.hpp"
 
 namespace quasilpv {
@@ -11,15 +13,17 @@ namespace quasilpv {
 ///     M, G, K, L = M_n(z(y)), G(y), K(z(y)), L(z(y))
 ///     innov  = (I + T L1)^-1 (y - th);  x_hat += T L innov                  implicit correction
 ///     d_f    = q d_f + (1 - q) d,  q = exp(-T/T_f)                          exact filter
-///     Gamma  = M r'' - d_f + Kp (th - r) + Kd (w - r') + KI e_I + G, limited
+///     Gamma  = M r'' + beta^-1 (Kp (th - r) + Kd (w - r') + KI e_I - d_f) + G, limited
 ///     e_I   += T (y - r)                                                    anti-windup: see integrate_error()
-///     a, j   = M^-1 (Gamma_applied - G + d), M^-1 dd
+///     a, j   = M^-1 (Gamma_applied - G + beta^-1 d), M^-1 beta^-1 dd
 ///     th    += T w + T^2/2 a + T^3/6 j;  w += T a + T^2/2 j;  d += T dd     exact zero-order hold
 ///
 /// The correction solves x = x_hat + T L (y - C x) for the x after it: unlike x_hat += T L (y - th) it stays stable
-/// when T times the observer's bandwidth is not small. Start and samples without a measurement: see ObserverLaw.
-/// Coriolis torque is part of the disturbance. Source: Dehak 2022, Theorem IV.11, in the reduced form with a constant
-/// observer matrix.
+/// when T times the observer's bandwidth is not small. beta(z(y)) is the identity unless the law has a
+/// premultiplication: then gains and disturbance are those of beta times the equations of motion. Disturbances are
+/// reported as torques at the joints; if beta is singular the torque is not finite. Start and samples without a
+/// measurement: see ObserverLaw. Coriolis torque is part of the disturbance. Source: Dehak 2022, Theorem IV.11, in the
+/// reduced form with a constant observer matrix.
 template <int N>
 class DobTorqueLaw final : public ObserverLaw<N> {
  public:
@@ -27,6 +31,7 @@ class DobTorqueLaw final : public ObserverLaw<N> {
       : ObserverLaw<N>(parameters.model, settings, parameters.filter_time_constant_s),
         feedback_(parameters.feedback),
         observer_(parameters.observer),
+        premultiplication_(parameters.premultiplication),
         sample_period_s_(settings.sample_period_s) {}
 
  private:
@@ -49,17 +54,26 @@ class DobTorqueLaw final : public ObserverLaw<N> {
                      StepReport& report) noexcept override {
     TrackingGain<N> gain;
     feedback_.evaluate(report.premise.data(), gain);
+    if (premultiplication_) {
+      premultiplication_->evaluate(report.premise.data(), beta_);
+      to_array<N>(at_joints(state.disturbance), report.estimated_disturbance);
+      to_array<N>(at_joints(state.filtered_disturbance), report.filtered_disturbance);
+    }
     TrackingError<N> error;
     error << state.angle - reference.angle, state.speed - reference.speed, state.integral_error;
-    return {model.inertia * reference.acceleration - state.filtered_disturbance + gain * error + model.gravity,
-            gain.template rightCols<N>().diagonal()};
+    const JointVector<N> correction = gain * error - state.filtered_disturbance;
+    JointVector<N> integral_gain;
+    for (int j = 0; j < N; ++j) {
+      integral_gain[j] = at_joints(gain.col(2 * N + j))[j];
+    }
+    return {model.inertia * reference.acceleration + at_joints(correction) + model.gravity, integral_gain};
   }
 
   // If the model has no finite answer, the reference acceleration is predicted.
   Motion predict(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& reference,
                  StepReport& report) noexcept override {
-    const JointVector<N> torque = from_array<N>(report.torque_applied) - model.gravity + state.disturbance;
-    Motion motion{model.acceleration(torque), model.acceleration(state.disturbance_rate)};
+    const JointVector<N> torque = from_array<N>(report.torque_applied) - model.gravity + at_joints(state.disturbance);
+    Motion motion{model.acceleration(torque), model.acceleration(at_joints(state.disturbance_rate))};
     if (!motion.acceleration.allFinite() || !motion.jerk.allFinite()) {
       motion = {reference.acceleration, JointVector<N>::Zero()};
       report.flags |= kModelInvalid;
@@ -67,9 +81,16 @@ class DobTorqueLaw final : public ObserverLaw<N> {
     return motion;
   }
 
+  /// beta^-1 of the sample times a torque of the premultiplied equations; control() evaluates beta.
+  JointVector<N> at_joints(const JointVector<N>& torque) const noexcept {
+    return premultiplication_ ? solve_general<N>(beta_, torque) : torque;
+  }
+
   BlockPolytope feedback_;
   BlockPolytope observer_;
+  std::optional<BlockPolytope> premultiplication_;
   double sample_period_s_;
+  JointMatrix<N> beta_ = JointMatrix<N>::Identity();
 };
 
 }  // namespace quasilpv

@@ -64,7 +64,8 @@ def shipped_law(artifact: Artifact) -> Law:
         )
     if law["kind"] == "dob-torque":
         tables = table("feedback"), table("observer")
-        return DobTorque(*tables, law["filter_time_constant_s"], inertia, gravity, output)
+        beta = table("premultiplication") if "premultiplication" in law else None
+        return DobTorque(*tables, law["filter_time_constant_s"], inertia, gravity, output, beta)
     speed_filter = SpeedFilter(float(np.exp(-T / law["velocity_filter_time_constant_s"])))
     if law["kind"] == "pid":
         reference_torque = speed_torque("coriolis_reference")

@@ -118,7 +118,8 @@ class DobTorque:
     """Scheduled feedback K = [Kp Kd KI], scheduled observer L and exact prediction, in torque coordinates.
 
     The correction is the linear equation it solves, x - x_hat = T L (y - C x); the prediction is the exponential of the
-    nilpotent chain th' = w, w' = M^-1 (gamma - G + d), d' = dd.
+    nilpotent chain th' = w, w' = M^-1 (gamma - G) + (beta M)^-1 d, d' = dd: the equations of motion times beta, where
+    u = beta (gamma - G) is designed.
     """
 
     feedback: Model
@@ -127,6 +128,7 @@ class DobTorque:
     inertia: Model
     gravity: Model
     output: OutputStage
+    premultiplication: Model | None = None
     x: FloatArray | None = None
     d_f: FloatArray | None = None
     integral: FloatArray | None = None
@@ -144,19 +146,26 @@ class DobTorque:
         q = np.exp(-T / self.T_f)
         d_f = q * d_f + (1.0 - q) * x[2 * n : 3 * n]
         error = np.concatenate([x[:n] - s.reference_angle, x[n : 2 * n] - s.reference_speed, e_I])
-        terms = (M @ s.reference_acceleration, -d_f, K @ error, G)
-        commanded = np.asarray(sum(terms))
+        beta = np.eye(n) if self.premultiplication is None else self.premultiplication(y)
+        terms = (beta @ M @ s.reference_acceleration, -d_f, K @ error, beta @ G)
+        to_joints = np.linalg.inv(beta)
+        commanded = to_joints @ np.asarray(sum(terms))
         applied = self.output.apply(commanded)
-        estimate = x[2 * n : 3 * n].copy()
-        self.integral = integrate(e_I, y - s.reference_angle, np.diag(K[:, 2 * n :]), T, commanded - applied)
+        estimate = to_joints @ x[2 * n : 3 * n]
+        integral_gain = np.diag(to_joints @ K[:, 2 * n :])
+        self.integral = integrate(e_I, y - s.reference_angle, integral_gain, T, commanded - applied)
         A = np.zeros((4 * n, 4 * n))
         A[:n, n : 2 * n] = A[2 * n : 3 * n, 3 * n :] = np.eye(n)
-        A[n : 2 * n, 2 * n : 3 * n] = mobility = np.linalg.inv(M)
+        mobility = np.linalg.inv(M)
+        A[n : 2 * n, 2 * n : 3 * n] = np.linalg.inv(beta @ M)
         x = x + T * A @ x + T**2 / 2 * A @ A @ x + T**3 / 6 * A @ A @ A @ x
         x[:n] += T**2 / 2 * mobility @ (applied - G)
         x[n : 2 * n] += T * mobility @ (applied - G)
         self.x, self.d_f = x, d_f
-        summands = (*(np.abs(term) for term in terms), np.abs(K) @ np.abs(error), np.abs(correction))
+        # What solving with beta makes of rounding: |beta^-1| |beta| |x| (Skeel 1979), x = beta^-1 summand.
+        solved = np.abs(to_joints) @ np.abs(beta) @ np.abs(to_joints)
+        joint_terms = (solved @ np.abs(term) for term in (*terms, np.abs(K) @ np.abs(error)))
+        summands = (*joint_terms, np.abs(correction))
         return Answer(commanded, applied, estimate, summands)
 
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -34,12 +35,15 @@ struct DobAccelerationParameters {
   bool disturbance_compensation = true;  ///< false: observed and predicted, but not subtracted
 };
 
-/// Kind `dob-torque`: gains scheduled on the premises of the inertia. Errors are x - x_r.
+/// Kind `dob-torque`: gains scheduled on the premises of the inertia. Errors are x - x_r. With a premultiplication beta
+/// gains and disturbances belong to beta(z) times the equations of motion: a torque x there is beta(z)^-1 x at the
+/// joints.
 struct DobTorqueParameters {
   DesignModel model;
-  BlockPolytope feedback;               ///< [Kp Kd KI], n x 3n: N m/rad, N m s/rad, N m/(rad s)
-  BlockPolytope observer;               ///< [L1; L2; L3; L4], 4n x n: 1/s, 1/s^2, N m/(rad s), N m/(rad s^2)
-  double filter_time_constant_s = 0.0;  ///< of the disturbance filter, > 0
+  BlockPolytope feedback;                          ///< [Kp Kd KI], n x 3n: N m/rad, N m s/rad, N m/(rad s)
+  BlockPolytope observer;                          ///< [L1; L2; L3; L4], 4n x n: 1/s, 1/s^2, N m/(rad s), N m/(rad s^2)
+  double filter_time_constant_s = 0.0;             ///< of the disturbance filter, > 0
+  std::optional<BlockPolytope> premultiplication;  ///< beta, n x n; none: the identity
 };
 
 /// Kind `hinf-tracking`: the gain Y(z) E(z)^-T P^-1 with E = diag(I, M_n, I), acting on (y - r, w - r', int (y - r)).

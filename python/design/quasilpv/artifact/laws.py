@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from quasilpv.artifact.strict_model import FieldError, StrictModel
 from quasilpv.artifact.tables import Matrix, PolytopeTable, Vector, require_lyapunov, require_shape, require_size
@@ -74,18 +74,34 @@ class DobAccelerationLaw(_Law):
 class DobTorqueLaw(_Law):
     """Tracking in torque coordinates with a disturbance observer and scheduled gains (Dehak 2022, Theorem IV.11).
 
-    ``feedback`` holds [Kp Kd KI], n x 3n, acting on x - x_r; ``observer`` holds [L1; L2; L3; L4], 4n x n.
+    ``feedback`` holds [Kp Kd KI], n x 3n, acting on x - x_r; ``observer`` holds [L1; L2; L3; L4], 4n x n. With
+    ``premultiplication`` beta, n x n, they belong to beta(z) times the equations of motion; a document without it has
+    no such member.
     """
 
     kind: Literal["dob-torque"]
     feedback: PolytopeTable
     observer: PolytopeTable
     filter_time_constant_s: Positive
+    premultiplication: PolytopeTable | None = None
+
+    @model_validator(mode="after")
+    def _refuse_null(self) -> Self:
+        if self.premultiplication is None and "premultiplication" in self.model_fields_set:
+            raise FieldError("premultiplication", "null", "a block polytope, or no member of this name")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _leave_out_absent(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        members: dict[str, Any] = serialise(self)
+        return {name: member for name, member in members.items() if member is not None}
 
     def check(self, joints: int) -> None:
         """See `_Law.check`."""
         self.feedback.require_gains("law.feedback", joints, 3 * joints, self.inertia)
         self.observer.require_gains("law.observer", 4 * joints, joints, self.inertia)
+        if self.premultiplication is not None:
+            self.premultiplication.require_gains("law.premultiplication", joints, joints, self.inertia)
 
 
 class HinfTrackingLaw(_VelocityLaw):

@@ -3,7 +3,8 @@
 The inequalities of a law are about the box and the inertia of its tables. Two claims tie these to the robot:
 
 * **premise box**: every premise is the cosine of a difference of absolute angles; its range over the operating domain,
-  enclosed in ball arithmetic, lies in the box the run-time side clamps it to.
+  enclosed in ball arithmetic, lies in the box the run-time side clamps it to. If the inertia is constant the premises
+  are those of the gains alone and may be any functions of the angles.
 * **inertia table**: for every premise vector of the box, the table is s times the inertia of the robot in the artifact,
   s > 0 one number, entry by entry within `ROUNDING` of its diagonal; a cosine that is not scheduled is held at a value
   it takes on the operating domain.
@@ -26,6 +27,8 @@ from quasilpv.certificate.gate_data import inertia_data
 from quasilpv.certificate.gate_inertia import InertiaData, Pair, design_inertia, true_inertia
 from quasilpv.certificate.gate_range import cosine_range
 from quasilpv.certificate.gate_rationals import to_float
+from quasilpv.certificate.stabilisation_model import premise_box_claims
+from quasilpv.certificate.vertex_tables import VertexTable
 
 ROUNDING = fmpq(1, 1 << 40)
 """Largest deviation of an entry, relative to the geometric mean of its diagonal entries: about 9e-13."""
@@ -39,7 +42,11 @@ def check_design_model(document: Mapping[str, Any]) -> tuple[Claim, ...]:
         KeyError, TypeError, ValueError: the document is not of the documented form.
     """
     data = inertia_data(document)
-    return (*_coverage_claims(data), *_inertia_claims(data))
+    if data.premise_pairs:
+        coverage = [*_coverage_claims(data)]
+    else:
+        coverage = premise_box_claims(document, VertexTable.parse(document["law"]["inertia"]), "premises")
+    return (*coverage, *_inertia_claims(data))
 
 
 def _coverage_claims(data: InertiaData) -> Iterator[Claim]:

@@ -57,7 +57,7 @@ def loop_data(document: Mapping[str, Any], source: str = "artifact") -> Accelera
 
 
 def inertia_data(document: Mapping[str, Any], source: str = "artifact") -> InertiaData:
-    """The true and the design inertia of an artifact.
+    """The true and the design inertia of an artifact; one that is the same at every vertex has no premises here.
 
     Args:
         document: the artifact as a JSON tree.
@@ -73,22 +73,27 @@ def inertia_data(document: Mapping[str, Any], source: str = "artifact") -> Inert
         if payloads.get(field) != rule:
             raise InputError(source, f"payloads.{field}", payloads.get(field), str(rule))
     inertia = document["law"]["inertia"]
-    premises = document["programs"]["premises"]["code"]
+    blocks = tuple(
+        InertiaBlock(
+            tuple(block["premises"]),
+            tuple(tuple(tuple(map(float, row)) for row in vertex) for vertex in block["vertices"]),
+        )
+        for block in inertia["blocks"]
+    )
+    lower, upper = (tuple(map(float, inertia[name])) for name in ("lower", "upper"))
+    code = document["programs"]["premises"]["code"]
+    vertices = {vertex for block in blocks for vertex in block.vertices}
+    if len(vertices) == 1:
+        blocks, lower, upper, code = (InertiaBlock((), tuple(vertices)),), (), (), []
     return InertiaData(
         mechanism=mechanism,
         mass_scale=tuple(map(float, payloads["mass_scale"])),
         com_scale=tuple(map(float, payloads["com_scale"])),
         angle_rad=tuple((float(low), float(high)) for low, high in document["domain"]["angle_rad"]),
-        premise_lower=tuple(map(float, inertia["lower"])),
-        premise_upper=tuple(map(float, inertia["upper"])),
-        premise_pairs=cosine_pairs(premises, mechanism.absolute_map, source),
-        blocks=tuple(
-            InertiaBlock(
-                tuple(block["premises"]),
-                tuple(tuple(tuple(map(float, row)) for row in vertex) for vertex in block["vertices"]),
-            )
-            for block in inertia["blocks"]
-        ),
+        premise_lower=lower,
+        premise_upper=upper,
+        premise_pairs=cosine_pairs(code, mechanism.absolute_map, source),
+        blocks=blocks,
     )
 
 

@@ -17,7 +17,6 @@ import numpy as np
 from flint import fmpq
 
 from quasilpv.certificate.gate_data import HALF_A_SAMPLE, inertia_data, law_kind
-from quasilpv.certificate.gate_inertia import InertiaData
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_range
 from quasilpv.certificate.gate_rationals import to_float
 from quasilpv.certificate.program_values import program_values
@@ -155,27 +154,26 @@ def growth_curves(gate: GridGate, points: int = CURVE_FACTORS) -> tuple[GrowthCu
 def frozen_torque_law(document: Mapping[str, Any], angles: FloatArray) -> TorqueLaw:
     """The law `dob-torque` of an artifact at B configurations, (B, n), its premises clamped to their box."""
     law = document["law"]
-    tables = {name: VertexTable.parse(law[name]) for name in ("inertia", "feedback", "observer")}
-    cosines = _premises_at(inertia_data(document), angles)
+    names = [name for name in ("inertia", "feedback", "observer", "premultiplication") if name in law]
+    premises = _premises_at(document, angles)
     return TorqueLaw(
         sample_period_s=float(document["sample_period_s"]),
         filter_time_constant_s=float(law["filter_time_constant_s"]),
-        **{name: table.evaluate(cosines) for name, table in tables.items()},
+        **{name: VertexTable.parse(law[name]).evaluate(premises) for name in names},
     )
 
 
-def _premises_at(data: InertiaData, angles: FloatArray) -> FloatArray:
-    """The cosines the premises are, (B, p)."""
-    absolute = data.absolute(angles)
-    columns = [np.cos(absolute[:, upper] - absolute[:, lower]) for lower, upper in data.premise_pairs]
+def _premises_at(document: Mapping[str, Any], angles: FloatArray) -> FloatArray:
+    """The outputs of the program ``premises``, (B, p)."""
+    columns = program_values(document["programs"]["premises"], list(angles.T), [])
     return np.array(columns).reshape(len(columns), len(angles)).T
 
 
 def frozen_hinf_law(document: Mapping[str, Any], angles: FloatArray) -> VelocityLaw:
     """The law `hinf-tracking` of an artifact at B configurations, (B, n), its premises clamped to their box."""
     law = document["law"]
-    cosines = _premises_at(inertia_data(document), angles)
-    numerator, inertia = (VertexTable.parse(law[name]).evaluate(cosines) for name in ("numerator", "inertia"))
+    premises = _premises_at(document, angles)
+    numerator, inertia = (VertexTable.parse(law[name]).evaluate(premises) for name in ("numerator", "inertia"))
     return hinf_tracking_law(
         float(document["sample_period_s"]),
         float(law["velocity_filter_time_constant_s"]),
@@ -190,8 +188,7 @@ def frozen_stabilising_law(document: Mapping[str, Any], angles: FloatArray) -> S
     law = document["law"]
     at_rest = list(0.0 * angles.T)
     premises = np.column_stack(program_values(document["programs"]["schedule"], list(angles.T), at_rest))
-    cosines = _premises_at(inertia_data(document), angles)
-    inertia = VertexTable.parse(law["inertia"]).evaluate(cosines)
+    inertia = VertexTable.parse(law["inertia"]).evaluate(_premises_at(document, angles))
     return StateLaw(
         float(document["sample_period_s"]),
         _STABILISING_GAINS[law["kind"]](law, premises, inertia),

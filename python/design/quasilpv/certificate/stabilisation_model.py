@@ -31,14 +31,17 @@ LARGEST_SUBDIVISION = 200_000
 _SEED = 2022
 
 
-def premise_box_claims(document: Mapping[str, Any], table: VertexTable) -> list[Claim]:
-    """The claims that the outputs of ``schedule`` stay in the box of a table."""
-    program = document["programs"]["schedule"]
+def premise_box_claims(document: Mapping[str, Any], table: VertexTable, name: str = "schedule") -> list[Claim]:
+    """The claims that the outputs of a program, of angles and speeds, stay in the box of a table."""
+    program = document["programs"][name]
     domain = [*document["domain"]["angle_rad"], *document["domain"]["speed_rad_s"]]
     outputs = _outputs(program)
     if len(outputs) != len(table.lower):
-        raise ValueError(f"{len(outputs)} outputs of the program schedule, {len(table.lower)} premises")
-    return [_premise_claim(p, output, domain, (table.lower[p], table.upper[p])) for p, output in enumerate(outputs)]
+        raise ValueError(f"{len(outputs)} outputs of the program {name}, {len(table.lower)} premises")
+    return [
+        _premise_claim(f"output {p} of {name}", output, domain, (table.lower[p], table.upper[p]))
+        for p, output in enumerate(outputs)
+    ]
 
 
 def _outputs(program: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -57,7 +60,7 @@ def _outputs(program: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _premise_claim(
-    index: int, program: Mapping[str, Any], domain: Sequence[Sequence[float]], box: tuple[float, float]
+    output: str, program: Mapping[str, Any], domain: Sequence[Sequence[float]], box: tuple[float, float]
 ) -> Claim:
     """Subdivide the domain until every piece is seen to stay inside the box, or the middle of one to be outside.
 
@@ -67,7 +70,7 @@ def _premise_claim(
         {int(op[1]) + (len(domain) // 2 if op[0] == "speed" else 0) for op in program["code"] if op[0] in _INPUTS}
     )
     pending = [[(float(low), float(high)) for low, high in domain]]
-    title = f"premise box: output {index} of schedule on the operating domain"
+    title = f"premise box: {output} on the operating domain"
     for _ in range(LARGEST_SUBDIVISION):
         if not pending:
             return Claim(title, True, 1.0)

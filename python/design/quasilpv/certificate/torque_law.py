@@ -24,6 +24,9 @@ gains alike (SI, signs of Dehak 2022, Theorem IV.11 in reduced form):
 
   that is: the error decays like exp(-alpha t), ``|D eps|^2 <= gamma (|d''|^2 + |n|^2)`` in L2, poles as above.
 
+A law with a premultiplication beta is one of ``beta(z) (M theta'' - u_joint) = beta(z) d_joint``: M_i above is then
+``beta_i M``, M the constant inertia of the table, and ``beta(z)`` is invertible because ``He(beta_i) > 0``.
+
 A double sum ``sum_ij w_i w_j X_ij < 0`` is claimed through ``X_ii < 0`` and ``2/(N-1) X_ii + X_ij + X_ji < 0`` for
 all ordered i != j (Tuan et al. 2001, Theorem 2.2).
 """
@@ -56,12 +59,28 @@ def check_dob_torque(document: Mapping[str, Any]) -> tuple[Claim, ...]:
     inertia, feedback, observer = tables.values()
     if not inertia.schedule == feedback.schedule == observer.schedule:
         raise ValueError("the three tables differ in box, centre or blocks")
+    claims: tuple[Claim, ...] = ()
+    vertices = inertia.vertices()
+    if "premultiplication" in law:
+        tables["premultiplication"] = VertexTable.parse(law["premultiplication"])
+        vertices, claims = _premultiplied(inertia, tables["premultiplication"])
     return (
-        *_feedback_claims(inertia.vertices(), feedback.vertices(), witness["feedback"]),
-        *_observer_claims(inertia.vertices(), observer.vertices(), witness["observer"]),
+        *claims,
+        *_feedback_claims(vertices, feedback.vertices(), witness["feedback"]),
+        *_observer_claims(vertices, observer.vertices(), witness["observer"]),
         *(claim for name, table in tables.items() for claim in table.collapse_claim(name)),
-        *check_torque_envelope(document, *(table.vertices() for table in tables.values())),
+        *check_torque_envelope(document, vertices, feedback.vertices(), observer.vertices()),
     )
+
+
+def _premultiplied(inertia: VertexTable, factor: VertexTable) -> tuple[tuple[fmpq_mat, ...], tuple[Claim, ...]]:
+    """The vertices beta_i M, and the claims that beta is invertible."""
+    first, *others = inertia.vertices()
+    if factor.schedule != inertia.schedule or any(first != M for M in others):
+        raise ValueError("a premultiplication has the schedule of the inertia, which is the same at every vertex")
+    betas = factor.vertices()
+    claims = (Claim.positive(f"premultiplication: invertible {i}", he(beta)) for i, beta in enumerate(betas))
+    return tuple(beta * first for beta in betas), tuple(claims)
 
 
 def _feedback_claims(

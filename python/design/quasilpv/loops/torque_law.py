@@ -22,6 +22,8 @@ class TorqueLaw:
         inertia: design inertia M, (B, n, n), kg m^2.
         feedback: [Kp Kd KI], (B, n, 3n).
         observer: [L1; L2; L3; L4], (B, 4n, n).
+        premultiplication: beta, (B, n, n): gains and disturbance are those of beta times the equations of motion, a
+            torque x there is beta^-1 x at the joints; None for the identity.
     """
 
     sample_period_s: float
@@ -29,6 +31,7 @@ class TorqueLaw:
     inertia: FloatArray
     feedback: FloatArray
     observer: FloatArray
+    premultiplication: FloatArray | None = None
 
     @property
     def states(self) -> int:
@@ -53,9 +56,9 @@ class TorqueLaw:
         )
         pole = math.exp(-T / self.filter_time_constant_s)
         filtered = pole * filtered + (1.0 - pole) * disturbance
-        command = K[:, 0] @ angle + K[:, 1] @ speed + K[:, 2] @ integral - filtered
-        acceleration = np.linalg.solve(self.inertia, command + disturbance)
-        jerk = np.linalg.solve(self.inertia, rate)
+        command = self._at_joints(K[:, 0] @ angle + K[:, 1] @ speed + K[:, 2] @ integral - filtered)
+        acceleration = np.linalg.solve(self.inertia, command + self._at_joints(disturbance))
+        jerk = np.linalg.solve(self.inertia, self._at_joints(rate))
         return command, [
             angle + speed + acceleration / 2.0 + jerk / 6.0,
             speed + acceleration + jerk / 2.0,
@@ -64,3 +67,6 @@ class TorqueLaw:
             filtered,
             integral + theta,
         ]
+
+    def _at_joints(self, torque: FloatArray) -> FloatArray:
+        return torque if self.premultiplication is None else np.asarray(np.linalg.solve(self.premultiplication, torque))

@@ -14,7 +14,7 @@ from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.acceleration_law import acceleration_law
 from quasilpv.synthesis.hinf_tracking import hinf_tracking
 from quasilpv.synthesis.specification import Specification
-from quasilpv.synthesis.torque_law import torque_law
+from quasilpv.synthesis.torque_law import premultiplied_torque_law, torque_law
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import Robot
 
@@ -67,6 +67,11 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
     "dob-torque": ControllerKind(
         "disturbance-observer tracking at the torque level (Dehak 2022, Theorem IV.11), positions only",
         torque_law,
+        rate_hz=4000.0,
+    ),
+    "dob-torque-premultiplied": ControllerKind(
+        "dob-torque for the equations of motion times the robot's own matrix beta (Dehak 2022, IV.5.2)",
+        premultiplied_torque_law,
         rate_hz=4000.0,
     ),
     "dob-acceleration": ControllerKind(

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
+from quasilpv.errors import InfeasibleError
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.systems.premise import Premise
 from quasilpv.systems.registry import Robot
@@ -26,12 +27,20 @@ class Schedule:
         polytope: Takagi-Sugeno representation of their box: for up to two premises no other has tighter vertices.
         inertia: vertices of the nominal inertia, (N, n, n), kg m^2.
         spread: largest eigenvalue of M_i^-1 M_j over the vertices.
+        premultiplication: vertices of beta, (N, n, n), for laws of beta times the equations of motion; the inertia is
+            then the same at every vertex, so that beta M is affine in the premises. None for the identity.
     """
 
     premises: tuple[Premise, ...]
     polytope: BlockPolytope
     inertia: FloatArray
     spread: float
+    premultiplication: FloatArray | None = None
+
+    @property
+    def model_inertia(self) -> FloatArray:
+        """The inertia of the inequalities: beta_i M, or M_i."""
+        return self.inertia if self.premultiplication is None else self.premultiplication @ self.inertia
 
     def premise_values(self, robot: Robot, angles: FloatArray) -> FloatArray:
         """The scheduled premises of a robot at B configurations, (B, n) rad -> (B, p)."""
@@ -66,3 +75,19 @@ def schedule_of(robot: Robot, chosen: Sequence[int]) -> Schedule:
         return Schedule(scheduled, polytope, vertices, math.inf)
     pairs = np.linalg.solve(vertices[:, None], vertices[None, :])
     return Schedule(scheduled, polytope, vertices, float(np.linalg.eigvals(pairs).real.max()))
+
+
+def premultiplied_schedule(robot: Robot) -> Schedule:
+    """The schedule of the robot's own premultiplication, with the constant inertia of its driven joints.
+
+    Raises:
+        InfeasibleError: the robot has none.
+    """
+    source = robot.model.premultiplication(robot.domain)
+    if source is None:
+        raise InfeasibleError(f"{robot.id}: no dob-torque-premultiplied design: the robot has no premultiplication")
+    premises, beta = tuple(premise.widened() for premise in source[0]), source[1]
+    polytope = BlockPolytope.takagi_sugeno([p.lower for p in premises], [p.upper for p in premises])
+    vertices = polytope.vertices(beta.constant, beta.coefficients)
+    inertia = np.broadcast_to(np.diag(robot.model.driven_inertia), vertices.shape)
+    return Schedule(premises, polytope, np.array(inertia), 1.0, vertices)

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from quasilpv.conditions.iv11_reduced import feedback_condition, observer_condition
 from quasilpv.conditions.sampled_chains import feedback_problem, observer_problem
@@ -59,9 +60,11 @@ def _sampled_chains(document: Mapping[str, Any]) -> dict[str, Problem]:
 
 def _torque_level(document: Mapping[str, Any]) -> dict[str, Problem]:
     """In the time units in which the pole disks have radius 2, and an inertia unit near the mean inertia."""
-    blocks = document["law"]["inertia"]["blocks"]
-    inertia = np.array([vertex for block in blocks for vertex in block["vertices"]])
+    law = document["law"]
+    inertia = _vertices(law["inertia"])
     unit = 2.0 ** round(math.log2(float(np.mean(np.linalg.eigvalsh(inertia)))))
+    if "premultiplication" in law:
+        inertia = _vertices(law["premultiplication"]) @ inertia
     feedback, observer = document["witness"]["feedback"], document["witness"]["observer"]
     rates = {name: half["disk_rad_s"] / 2.0 for name, half in (("feedback", feedback), ("observer", observer))}
     noise = observer["noise"] * rates["observer"] ** 4 * unit
@@ -69,6 +72,10 @@ def _torque_level(document: Mapping[str, Any]) -> dict[str, Problem]:
         "feedback": feedback_condition(inertia / unit, feedback["decay_per_s"] / rates["feedback"], 2.0).problem,
         "observer": observer_condition(inertia / unit, observer["decay_per_s"] / rates["observer"], 2.0, noise).problem,
     }
+
+
+def _vertices(table: Mapping[str, Any]) -> npt.NDArray[np.float64]:
+    return np.array([vertex for block in table["blocks"] for vertex in block["vertices"]])
 
 
 _HALVES: Mapping[str, Callable[[Mapping[str, Any]], dict[str, Problem]]] = {

@@ -36,7 +36,7 @@ from quasilpv.synthesis.acceleration_design import Progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix, Premise
+from quasilpv.systems.premise import AffineMatrix
 from quasilpv.systems.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
@@ -54,9 +54,6 @@ FILTER_SAMPLES = 2.0
 """Time constant of the speed filter, in samples."""
 
 BACK_OFF = 0.1
-
-BOX_MARGIN = 1e-3
-"""By how much of its width the box of a premise exceeds its range on both sides, so that an enclosure can prove it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +80,7 @@ Solver = Callable[[PolytopicModel, float, float], Candidate | None]
 def full_model(robot: Robot) -> PolytopicModel:
     """The robot around theta = 0 with all its premises, one block each."""
     system = robot.model.as_descriptor_system(robot.domain)
-    return _per_premise(replace(system, premises=tuple(map(_widened, system.premises))))
+    return _per_premise(replace(system, premises=tuple(premise.widened() for premise in system.premises)))
 
 
 def inertia_model(robot: Robot) -> PolytopicModel:
@@ -104,7 +101,7 @@ def inertia_model(robot: Robot) -> PolytopicModel:
     return _per_premise(
         replace(
             system,
-            premises=(_widened(system.premises[0]),),
+            premises=(system.premises[0].widened(),),
             E=alone(system.E),
             A=AffineMatrix(at_rest, np.zeros((1, *at_rest.shape))),
             B=alone(system.B),
@@ -115,11 +112,6 @@ def inertia_model(robot: Robot) -> PolytopicModel:
 
 def _per_premise(system: DescriptorSystem) -> PolytopicModel:
     return PolytopicModel(system, BlockPolytope.per_premise(system.lower, system.upper))
-
-
-def _widened(premise: Premise) -> Premise:
-    margin = BOX_MARGIN * (premise.upper - premise.lower)
-    return replace(premise, bounds=(premise.lower - margin, premise.upper + margin))
 
 
 def _named(problem: Problem, name: str) -> Variable:

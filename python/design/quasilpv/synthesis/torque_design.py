@@ -140,6 +140,7 @@ class _Search:
             observer.gains,
             self.specification.sample_period_s,
             filter_time_s,
+            self.schedule.premultiplication,
         )
 
     def is_stable(self, law: ScheduledLaw) -> bool:
@@ -190,13 +191,16 @@ class _Search:
                 yield candidate
 
 
-def design_torque_law(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TorqueDesign:
+def design_torque_law(
+    robot: Robot, specification: Specification, progress: Progress = no_progress, scheduled: Schedule | None = None
+) -> TorqueDesign:
     """Choose disks, filter and design inertia of `dob-torque`, and return the gains with their evidence.
 
     Args:
         robot: nominal model, operating domain, limits and payload set.
         specification: what is asked for.
         progress: called with (points done, points in all).
+        scheduled: what the gains depend on (default: `schedule`).
 
     Raises:
         InfeasibleError: the inequalities have no verified solution, or no point of the search passes the gate within
@@ -204,7 +208,7 @@ def design_torque_law(robot: Robot, specification: Specification, progress: Prog
     """
     about = f"{robot.id}: no dob-torque design at {specification.rate_hz:g} Hz"
     for back_off in BACK_OFFS:
-        search = _search(robot, specification, schedule(robot), back_off, about)
+        search = _search(robot, specification, scheduled or schedule(robot), back_off, about)
         design = _best(search, progress, about)
         if holds_exactly(design.law, design.feedback, design.observer):
             return design
@@ -248,6 +252,8 @@ def torque_design_at(
 def holds_exactly(law: ScheduledLaw, feedback: FeedbackPoint, observer: ObserverPoint) -> bool:
     """Whether the inequalities hold, in rational arithmetic, for the inertia and gains of the tables as they are."""
     inertia = to_rational(law.inertia)
+    if law.premultiplication is not None:
+        inertia = to_rational(law.premultiplication) @ inertia
     return feedback_condition(inertia, Fraction(feedback.decay), Fraction(feedback.disk)).holds_at(
         feedback
     ) and observer_condition(
@@ -262,8 +268,8 @@ def _search(robot: Robot, specification: Specification, scheduled: Schedule, bac
         robot,
         specification,
         scheduled,
-        _unit_feedback(scheduled.inertia / unit, back_off, about),
-        _unit_observer(scheduled.inertia / unit, back_off, about),
+        _unit_feedback(scheduled.model_inertia / unit, back_off, about),
+        _unit_observer(scheduled.model_inertia / unit, back_off, about),
         unit,
         ScheduledPlants.of(robot, scheduled, PlantGrid.screen(robot)),
     )

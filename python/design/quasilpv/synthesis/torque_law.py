@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
+from quasilpv.synthesis.inertia_schedule import premultiplied_schedule
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.torque_design import TorqueDesign, design_torque_law
 from quasilpv.synthesis.torque_envelope import VertexTables, torque_envelope
@@ -26,6 +28,29 @@ def torque_law(robot: Robot, specification: Specification, progress: Progress = 
     return tracking_design(robot, specification, design_torque_law(robot, specification, progress))
 
 
+def premultiplied_torque_law(
+    robot: Robot, specification: Specification, progress: Progress = no_progress
+) -> TrackingDesign:
+    """Design `dob-torque` for beta(z) times the equations of motion, as Dehak 2022, IV.5.2 does for the five-bar robot.
+
+    The inertia of the design model is beta(z) times the constant one of the driven joints; what the mechanism adds to
+    it is disturbance. No operating envelope is stated: its sets would be those of premultiplied torques.
+
+    Args:
+        robot, specification, progress: as for `torque_law`.
+
+    Raises:
+        InfeasibleError: the robot has no premultiplication, or no design meets the specification.
+    """
+    design = design_torque_law(robot, specification, progress, premultiplied_schedule(robot))
+    controller = "dob-torque-premultiplied"
+    return replace(
+        tracking_design(robot, specification, design, envelope=False),
+        controller=controller,
+        inputs={"controller": controller, "specification": specification.to_document()},
+    )
+
+
 def tracking_design(
     robot: Robot, specification: Specification, design: TorqueDesign, *, envelope: bool = True
 ) -> TrackingDesign:
@@ -39,7 +64,9 @@ def tracking_design(
     Raises:
         InfeasibleError: the law has no verified operating envelope.
     """
-    tables = design.law
+    tables, premultiplication = design.law, {}
+    if tables.premultiplication is not None:
+        premultiplication = {"premultiplication": tables.polytope.to_document(tables.premultiplication)}
     witness = _witness(design)
     if envelope:
         vertices = VertexTables(tables.inertia, tables.feedback, tables.observer)
@@ -54,6 +81,7 @@ def tracking_design(
             "observer": tables.polytope.to_document(tables.observer),
             "filter_time_constant_s": tables.filter_time_constant_s,
             "inertia": tables.polytope.to_document(tables.inertia),
+            **premultiplication,
         },
         expressions={
             "premises": tuple(premise.expression for premise in design.schedule.premises),

@@ -63,6 +63,7 @@ class ScheduledLaw:
         inertia, feedback, observer: vertices, (N, n, n), (N, n, 3n), (N, 4n, n), SI.
         sample_period_s: T.
         filter_time_constant_s: T_f.
+        premultiplication: vertices of beta, (N, n, n), see `Schedule`.
     """
 
     polytope: BlockPolytope
@@ -71,12 +72,16 @@ class ScheduledLaw:
     observer: FloatArray
     sample_period_s: float
     filter_time_constant_s: float
+    premultiplication: FloatArray | None = None
 
     def at(self, premises: FloatArray) -> TorqueLaw:
         """The law frozen at B premise vectors, (B, p), clamped to the box as the run-time side does."""
         weights = self.polytope.weights(self.polytope.saturate(premises)[0])
-        tables = (np.tensordot(weights, table, axes=1) for table in (self.inertia, self.feedback, self.observer))
-        return TorqueLaw(self.sample_period_s, self.filter_time_constant_s, *tables)
+        tables = [self.inertia, self.feedback, self.observer]
+        if self.premultiplication is not None:
+            tables.append(self.premultiplication)
+        frozen = (np.tensordot(weights, table, axes=1) for table in tables)
+        return TorqueLaw(self.sample_period_s, self.filter_time_constant_s, *frozen)
 
 
 class Scheduled(Protocol):

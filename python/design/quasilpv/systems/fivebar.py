@@ -18,11 +18,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import sympy as sp
 from numpy.typing import ArrayLike
 
 from quasilpv.errors import InputError
+from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.systems.fivebar_linkage import FiveBarLinkage
 from quasilpv.systems.mechanism import Matrix, PlanarMechanism, Vector
+from quasilpv.systems.premise import AffineMatrix, Premise
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,15 @@ class RhombicFiveBar(PlanarMechanism):
             InputError: not two factors each, or a factor that leaves no rigid body.
         """
         return RhombicFiveBar(self.linkage.perturbed(mass_scale, com_scale))
+
+    def premultiplication(self, domain: OperatingDomain) -> tuple[tuple[Premise, ...], AffineMatrix]:
+        """``beta = [1, sin theta_1; 0, 1]`` of Dehak 2022, IV.5.2, and its premise.
+
+        Multiplied with it from the left the constant inertia c_4 I of the active joints becomes c_4 beta.
+        """
+        theta_1 = self.symbolic.theta[0]
+        premise = Premise.over({theta_1: domain.angle_rad[0]}, "sigma1", sp.sin(theta_1))
+        return (premise,), AffineMatrix(np.eye(2), np.array([[[0.0, 1.0], [0.0, 0.0]]]))
 
     def parameters_document(self) -> dict[str, Any]:
         """The physical parameters as JSON-able data, see `FiveBarLinkage.parameters_document`."""

@@ -219,6 +219,10 @@ class PlanarMechanism(ABC):
         coefficients = np.array([term(k, j) for k, j in pairs]).reshape(len(pairs), n, n)
         return AffineMatrix(self._in_joint_angles(np.diag(np.diag(D))), coefficients)
 
+    def premultiplication(self, domain: OperatingDomain) -> tuple[tuple[Premise, ...], AffineMatrix] | None:
+        """Premises, and a matrix affine in them by which the source multiplies the equations of motion; or None."""
+        return None
+
     def as_descriptor_system(self, domain: OperatingDomain) -> DescriptorSystem:
         """The descriptor model E(z) x' = A(z) x + B u, y = theta, with x = (theta, omega), u = Gamma.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import isfinite
 
@@ -13,6 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from quasilpv.errors import InputError
 from quasilpv.systems.intervals import enclose
+
+BOX_MARGIN = 1e-3
+"""By how much of its width the box of a widened premise exceeds its bounds on both sides."""
 
 
 class PremiseKind(StrEnum):
@@ -68,6 +71,11 @@ class Premise:
     def upper(self) -> float:
         """Guaranteed upper bound."""
         return self.bounds[1]
+
+    def widened(self) -> Premise:
+        """The premise with `BOX_MARGIN` to spare, so that enclosures over pieces of the domain can prove its bounds."""
+        margin = BOX_MARGIN * (self.upper - self.lower)
+        return replace(self, bounds=(self.lower - margin, self.upper + margin))
 
 
 @dataclass(frozen=True, eq=False)
