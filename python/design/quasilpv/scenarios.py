@@ -162,15 +162,15 @@ TAGS = ("serial-arm", "five-bar", "spring-disc", "ida", "rk4")
 """The kinds that tell the cases of a union apart."""
 
 
-def _sines(*terms: tuple[float, float]) -> tuple[SineTorque, ...]:
-    """One sine per joint, (amplitude in N m, frequency in rad/s) each."""
+def sine_torques(*terms: tuple[float, float]) -> tuple[SineTorque, ...]:
+    """External torques of one sine per joint, (amplitude in N m, frequency in rad/s) each."""
     return tuple(
         SineTorque(joint=joint, amplitude_nm=amplitude, frequency_rad_s=frequency)
         for joint, (amplitude, frequency) in enumerate(terms)
     )
 
 
-EXTERNAL_TORQUE = _sines((450.0, 15.0), (375.0, 15.0), (300.0, 15.0))
+EXTERNAL_TORQUE = sine_torques((450.0, 15.0), (375.0, 15.0), (300.0, 15.0))
 """The disturbance of Dehak 2022 (III.53): joint torques, added to the control torque as they are."""
 
 
@@ -259,7 +259,7 @@ def _stabilisation(name: str, summary: str, robot_id: str, joints: int) -> Track
 def _spiral(name: str, disturbance: str, *terms: tuple[float, float]) -> TrackingTask:
     """The spiral of the five-bar robot under one reading of (IV.77), or a stronger disturbance."""
     summary = f"the five-bar robot draws a spiral in 5 s, disturbed by {disturbance}"
-    return TrackingTask(name, summary, "fivebar", fivebar_spiral, _sines(*terms))
+    return TrackingTask(name, summary, "fivebar", fivebar_spiral, sine_torques(*terms))
 
 
 def tracking_tasks() -> tuple[TrackingTask, ...]:

@@ -6,6 +6,9 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from quasilpv.errors import InputError
 
 Interval = tuple[float, float]
@@ -94,6 +97,25 @@ class OperatingDomain:
     def symmetric(cls, joints: int, angle_rad: float, speed_rad_s: float) -> OperatingDomain:
         """The box ``|theta_i| <= angle_rad``, ``|omega_i| <= speed_rad_s`` for every joint."""
         return cls(((-angle_rad, angle_rad),) * joints, ((-speed_rad_s, speed_rad_s),) * joints)
+
+    @classmethod
+    def around(
+        cls, angle_rad: ArrayLike, speed_rad_s: ArrayLike, margin_rad: float = 0.1, speed_factor: float = 1.5
+    ) -> OperatingDomain:
+        """The box of a motion, widened.
+
+        Args:
+            angle_rad: joint angles at many times, times x n.
+            speed_rad_s: joint speeds, likewise; the box of speeds is symmetric.
+            margin_rad: added to both ends of every range of angles.
+            speed_factor: multiplies the largest speed of every joint.
+        """
+        angle, fastest = np.asarray(angle_rad, dtype=float), np.abs(speed_rad_s).max(axis=0) * speed_factor
+        low, high = angle.min(axis=0) - margin_rad, angle.max(axis=0) + margin_rad
+        return cls(
+            tuple((float(a), float(b)) for a, b in zip(low, high, strict=True)),
+            tuple((-float(speed), float(speed)) for speed in fastest),
+        )
 
     @property
     def joints(self) -> int:

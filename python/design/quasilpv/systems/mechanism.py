@@ -97,7 +97,16 @@ class PlanarMechanism(ABC):
 
     @abstractmethod
     def forward_kinematics(self, theta: ArrayLike) -> Vector:
-        """Tool pose: (X, Y) in metres, then the orientation Phi in rad if the tool has one of its own."""
+        """Tool pose: (X, Y) in metres, the orientation Phi in rad if the tool has one of its own, then the posture."""
+
+    @property
+    def posture(self) -> tuple[float, ...]:
+        """Values at which this mechanism keeps the pose coordinates that no path states.
+
+        A mechanism with more joints than its tool has coordinates adds functions of its angles to the pose, as many as
+        it has joints to spare, and uses the spare joints to keep them constant (Baillieul 1985).
+        """
+        return ()
 
     @abstractmethod
     def inverse_kinematics(self, pose: ArrayLike) -> Vector:

@@ -32,7 +32,11 @@ MAX_REFINEMENTS = 6
 
 
 class Kinematics(Protocol):
-    """What planning needs of a robot; a pose is (X, Y, Phi), or (X, Y) if the tool has no orientation of its own."""
+    """What planning needs of a robot.
+
+    A pose is (X, Y), then the orientation Phi if the tool has one of its own, then the posture of a robot with joints
+    to spare: as many coordinates as joints.
+    """
 
     @property
     def name(self) -> str:
@@ -41,6 +45,10 @@ class Kinematics(Protocol):
     @property
     def joints(self) -> int:
         """Number of joints n."""
+
+    @property
+    def posture(self) -> tuple[float, ...]:
+        """What the coordinates of the pose that no path states are kept at."""
 
     def forward_kinematics(self, theta: npt.ArrayLike) -> Array:
         """Pose of the tool, as many coordinates as joints."""
@@ -112,11 +120,12 @@ def joint_motion(arm: Kinematics, path: TaskPath, times_s: Array, source: str) -
         InputError: out of reach or singular (``singularity`` below ``MIN_SINGULARITY``) at one of the times.
     """
     angles, speeds, accelerations = [], [], []
-    at_rest = [0.0] * len(path.orientation)
+    held = (*path.orientation, *arm.posture)
+    at_rest = [0.0] * len(held)
     for time in times_s:
         task = path.evaluate(float(time))
         try:
-            theta = arm.inverse_kinematics([*task.position, *path.orientation])
+            theta = arm.inverse_kinematics([*task.position, *held])
         except InputError as error:
             raise InputError(source, _place(path, time), error.got, error.expected) from error
         measure, value = arm.singularity(theta)
@@ -149,18 +158,19 @@ def quintic_hermite(knots_s: Array, motion: Reference) -> Array:
 
 
 def fit_errors(arm: Kinematics, path: TaskPath, trajectory: Trajectory) -> tuple[float, float]:
-    """Return the largest distance, m, and orientation error, rad, between tool and path halfway between the knots."""
+    """Return the largest errors halfway between the knots: distance from the path, m, orientation and posture, rad."""
     middles = 0.5 * (trajectory.knots_s[:-1] + trajectory.knots_s[1:])
     poses = np.array([arm.forward_kinematics(angle) for angle in trajectory.evaluate(middles).angle])
     positions = np.array([path.evaluate(float(time)).position for time in middles])
     distances = np.linalg.norm(poses[:, :2] - positions, axis=1)
-    turned = np.abs(poses[:, 2:] - np.array(path.orientation))
+    turned = np.abs(poses[:, 2:] - np.array([*path.orientation, *arm.posture]))
     return float(distances.max()), float(turned.max(initial=0.0))
 
 
 def _require_orientation(arm: Kinematics, path: TaskPath, source: str) -> None:
-    if 2 + len(path.orientation) != arm.joints:
-        expected = f"a path of {arm.joints} coordinates, as {arm.name} has joints: an orientation with 3, none with 2"
+    coordinates = arm.joints - len(arm.posture)
+    if 2 + len(path.orientation) != coordinates:
+        expected = f"a path of the {coordinates} coordinates of {arm.name}: an orientation with 3, none with 2"
         raise InputError(source, "tool_angle_rad", path.tool_angle_rad, expected)
 
 
