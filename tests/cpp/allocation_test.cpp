@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "artifact_fixture.hpp"
+#include "loop_fixture.hpp"
 #include "quasilpv/controller.hpp"
 #include "quasilpv/trajectory.hpp"
 
@@ -158,6 +159,28 @@ TEST_F(Allocation, does_not_happen_when_a_trajectory_is_evaluated) {
             }),
             0);
   EXPECT_GT(sum, 0.0);
+}
+
+// Good samples, gaps, bad angles, a fault, its reset and telemetry that nobody takes away.
+TEST_F(Allocation, does_not_happen_in_the_control_loop_whatever_the_readings) {
+  LoopSettings settings;
+  settings.bumpless_start = true;
+  ControlLoop loop(::quasilpv::testing::artifact(), ::quasilpv::testing::trajectory(), settings);
+  auto ring = std::make_unique<SampleRing>();
+  loop.publish_to(ring.get());
+  std::int64_t resets = 0;
+  EXPECT_EQ(allocations_of([&] {
+              for (std::int64_t seq = 0; seq < 10000; seq += seq % 7 == 0 ? 3 : 1) {
+                RobotReading reading = ::quasilpv::testing::reading(seq);
+                reading.angle_rad[1] = seq % 1000 < 30 ? std::numeric_limits<double>::quiet_NaN() : 0.1;
+                loop.handle(reading, ::quasilpv::testing::at(seq));
+                resets += seq % 1000 == 500 && loop.reset_fault() ? 1 : 0;
+              }
+              loop.handle_silence(::quasilpv::testing::at(10000));
+            }),
+            0);
+  EXPECT_GT(resets, 0);
+  EXPECT_EQ(loop.state(), ControllerState::kFault);
 }
 
 }  // namespace

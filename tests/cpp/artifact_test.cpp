@@ -102,7 +102,7 @@ TEST(Artifact, refuses_any_missing_member_and_names_it) {
   }
 }
 
-TEST(Artifact, refuses_wrong_values_and_names_the_field) {
+TEST(Artifact, F8_refuses_wrong_values_and_names_the_field) {
   EXPECT_THAT(refused("/schema", "quasilpv.trajectory"), HasSubstr("a.json: schema: got \"quasilpv.trajectory\""));
   EXPECT_THAT(refused("/schema_version", 2), HasSubstr("a.json: schema_version: got 2, expected an integer in [1, 1]"));
   EXPECT_THAT(refused("/design_hash", std::string(64, 'A')), HasSubstr("a.json: design_hash: "));

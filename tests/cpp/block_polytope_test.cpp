@@ -124,7 +124,7 @@ TEST(BlockPolytope, reproduces_random_affine_matrices_for_random_partitions) {
   EXPECT_LT(collapsed, 190);
 }
 
-TEST(BlockPolytope, has_weights_that_are_not_negative_and_sum_to_one_over_the_blocks_in_each_block) {
+TEST(BlockPolytope, F9_has_weights_that_are_not_negative_and_sum_to_one_over_the_blocks_in_each_block) {
   std::mt19937_64 random(19);
   for (int i = 0; i < 100; ++i) {
     const int premises = 1 + i % 5;
@@ -176,7 +176,7 @@ TEST(BlockPolytope, is_unchanged_by_a_slack_shift) {
   EXPECT_LT((value - affine.at(z)).cwiseAbs().maxCoeff(), 1e-12 * 100.0);
 }
 
-TEST(BlockPolytope, when_a_premise_is_outside_the_box_expect_it_clamped_and_reported) {
+TEST(BlockPolytope, F9_when_a_premise_is_outside_the_box_expect_it_clamped_and_reported) {
   std::mt19937_64 random(31);
   const AffineMatrix affine(2, random);
   for (const auto& partition : {singles(2), std::vector<std::vector<int>>{{0, 1}}}) {

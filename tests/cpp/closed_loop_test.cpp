@@ -168,7 +168,7 @@ TEST(DobAccelerationLoop, finds_a_constant_disturbance_and_rejects_it) {
 }
 
 // The prediction is exact on the nominal plant, so nothing is lost with 19 measurements.
-TEST(DobAccelerationLoop, when_19_measurements_are_missing_on_the_nominal_plant_expect_the_same_motion) {
+TEST(DobAccelerationLoop, F3_when_19_measurements_are_missing_on_the_nominal_plant_expect_the_same_motion) {
   Controller controller = controller_of(design_table(2));
   SampledPlant plant(2);
   const auto moving = [&plant](int k) {  // r = 0.1 t^2
@@ -189,9 +189,43 @@ TEST(DobAccelerationLoop, when_19_measurements_are_missing_on_the_nominal_plant_
   }
 }
 
+// A disturbance acceleration a that begins with a loss of n samples is unknown until the first measurement after it. Up
+// to then the arm drifts as a free mass does, a t^2 / 2. From there on the loop of bandwidth w has that distance and
+// the speed a n T to take back, and a itself to learn: a n T / w and a / w^2 in its own units of length.
+TEST(DobAccelerationLoop, F3_when_1_to_19_measurements_are_missing_expect_the_error_within_its_bound) {
+  constexpr double kDisturbance = 10.0;
+  constexpr int kFirst = 50;
+  for (int missing = 1; missing < 20; ++missing) {
+    for (const bool commanded : {true, false}) {  // a bad encoder; a lost message, during which the torque is held
+      Controller controller = controller_of(design_table(2));
+      SampledPlant plant(2);
+      double worst = 0.0;
+      for (int k = 0; k < 1500; ++k) {
+        plant.disturbance.setConstant(k < kFirst ? 0.0 : kDisturbance);
+        StepInput input = plant.sample().input(k);
+        input.valid = k < kFirst || k >= kFirst + missing;
+        input.commanded = input.valid || commanded;
+        const StepReport report = controller.step(input);
+        const double lost_s = T * (k - kFirst);
+        if (!input.valid) {
+          const double drift = kDisturbance * lost_s * lost_s / 2.0;
+          ASSERT_NEAR(plant.angle(0), drift, 1e-3 * drift) << missing << " at " << k;  // gravity changes on the way
+        }
+        worst = std::max(worst, plant.angle.cwiseAbs().maxCoeff());
+        plant.advance(report.torque_applied);
+      }
+      const double lost_s = missing * T;
+      const double w = kFeedbackBandwidth;
+      EXPECT_GE(worst, (1.0 - 1e-3) * kDisturbance * lost_s * lost_s / 2.0);
+      EXPECT_LE(worst, kDisturbance * (lost_s * lost_s / 2.0 + lost_s / w + 1.0 / (w * w))) << missing;
+      EXPECT_LT(plant.angle.cwiseAbs().maxCoeff(), 1e-6);
+    }
+  }
+}
+
 // What the limits took away is not a disturbance: the observer is fed with the torque that acted. The overshoot after
 // seconds of saturation stays below the distance the arm came from.
-TEST(DobAccelerationLoop, when_saturated_expect_no_disturbance_estimate_no_windup_and_recovery) {
+TEST(DobAccelerationLoop, F10_when_saturated_expect_no_disturbance_estimate_no_windup_and_recovery) {
   Json table = design_table(2);
   table["limits"]["torque_nm"] = {60.0, 60.0};
   Controller controller = controller_of(table);

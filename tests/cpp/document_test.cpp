@@ -215,14 +215,14 @@ class EveryTwin : public ::testing::TestWithParam<bool> {
       GetParam() ? json_twin(artifact_table("dob-acceleration", 3)) : cbor_twin(artifact_table("dob-acceleration", 3));
 };
 
-TEST_P(EveryTwin, is_refused_when_truncated_at_any_byte) {
+TEST_P(EveryTwin, F8_is_refused_when_truncated_at_any_byte) {
   ASSERT_NO_THROW(Artifact::parse(bytes_, "twin"));
   for (std::size_t size = 0; size < bytes_.size(); ++size) {
     ASSERT_THROW(Artifact::parse(bytes_.substr(0, size), "twin"), InputError) << "truncated to " << size;
   }
 }
 
-TEST_P(EveryTwin, is_refused_when_any_bit_is_flipped) {
+TEST_P(EveryTwin, F8_is_refused_when_any_bit_is_flipped) {
   std::mt19937_64 random(13);
   std::uniform_int_distribution<std::size_t> bit_of(0, 8 * bytes_.size() - 1);
   for (int i = 0; i < 4000; ++i) {
@@ -307,7 +307,7 @@ TEST(Document, refuses_a_million_levels_without_exhausting_the_stack) {
   EXPECT_THROW(parse_document("\xa1\x61\x61" + std::string(1000000, '\x81'), "x"), InputError);
 }
 
-TEST(StrictJson, refuses_duplicates_zero_bytes_comments_and_numbers_out_of_range) {
+TEST(StrictJson, F8_refuses_duplicates_zero_bytes_comments_and_numbers_out_of_range) {
   EXPECT_THAT(refusal([] { parse_strict_json(R"({"a":{"b":1,"b":1}})", "s"); }),
               HasSubstr("s: b: got a second member"));
   EXPECT_THAT(refusal([] { parse_strict_json(std::string("{}\0{}", 5), "s"); }), HasSubstr("zero byte"));

@@ -49,7 +49,7 @@ TEST(Failsafe, when_the_first_sample_is_healthy_expect_running) {
   EXPECT_EQ(Clockwork().sample({}).state, ControllerState::kRunning);
 }
 
-TEST(Failsafe, when_1_to_19_measurements_are_missing_expect_degraded_then_running_again) {
+TEST(Failsafe, F3_when_1_to_19_measurements_are_missing_expect_degraded_then_running_again) {
   Clockwork policy;
   for (int count = 1; count < 20; ++count) {
     ASSERT_EQ(policy.sample(invalid(count)).state, ControllerState::kDegraded) << count;
@@ -110,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(Failsafe, EveryLimit,
                                                  FaultCause::kPremiseOutsideBox}),
                          [](const auto& limit) { return std::string(limit.param.name); });
 
-TEST(Failsafe, when_a_premise_leaves_its_box_briefly_expect_no_more_than_running) {
+TEST(Failsafe, F9_when_a_premise_leaves_its_box_briefly_expect_no_more_than_running) {
   Clockwork policy;
   for (int i = 0; i < 5000; ++i) {
     FailsafeFlags flags;
@@ -119,7 +119,7 @@ TEST(Failsafe, when_a_premise_leaves_its_box_briefly_expect_no_more_than_running
   }
 }
 
-TEST(Failsafe, when_the_premise_fault_is_switched_off_expect_degraded_for_ever) {
+TEST(Failsafe, F9_when_the_premise_fault_is_switched_off_expect_degraded_for_ever) {
   FailsafeSettings settings;
   settings.premise_fault_ns = 0;
   Clockwork policy(settings);
@@ -130,7 +130,7 @@ TEST(Failsafe, when_the_premise_fault_is_switched_off_expect_degraded_for_ever) 
   EXPECT_EQ(state.state, ControllerState::kDegraded);
 }
 
-TEST(Failsafe, when_a_fault_is_latched_expect_a_ramp_to_the_safe_torque_within_50_ms) {
+TEST(Failsafe, F2_when_a_fault_is_latched_expect_a_ramp_to_the_safe_torque_within_50_ms) {
   Clockwork policy;
   policy.sample(invalid(20));
   double previous = -1.0;
@@ -143,6 +143,45 @@ TEST(Failsafe, when_a_fault_is_latched_expect_a_ramp_to_the_safe_torque_within_5
   }
   EXPECT_EQ(policy.action_after(0).safe_share, 0.0);
   EXPECT_EQ(policy.action_after(50 * kMillisecond).safe_share, 1.0);
+}
+
+FailsafeState fault_of(const FailsafeFlags& flags) { return Clockwork().sample(flags); }
+
+TEST(Failsafe, when_reset_with_its_cause_gone_expect_ready_and_no_memory_of_the_fault) {
+  const FailsafeState state = after_reset({}, fault_of(invalid(20)), {});
+  EXPECT_EQ(state.state, ControllerState::kReady);
+  EXPECT_EQ(state.cause, FaultCause::kNone);
+  EXPECT_EQ(next_state({}, state, {}, kMillisecond).state, ControllerState::kRunning);
+}
+
+TEST(Failsafe, when_reset_while_a_cause_or_an_invalid_measurement_is_there_expect_still_fault) {
+  FailsafeFlags stop;
+  stop.stop_requested = true;
+  FailsafeFlags silent;
+  silent.plant_silent = true;
+  for (const FailsafeFlags& flags : {invalid(1), invalid(20), overruns(21), foreign(100), stop, silent}) {
+    EXPECT_EQ(after_reset({}, fault_of(invalid(20)), flags).state, ControllerState::kFault);
+  }
+}
+
+TEST(Failsafe, when_reset_outside_a_fault_expect_the_state_untouched) {
+  EXPECT_EQ(after_reset({}, fault_of(invalid(3)), {}).state, ControllerState::kDegraded);
+}
+
+TEST(Failsafe, when_reset_outside_the_premise_box_expect_the_whole_time_again_before_the_next_fault) {
+  Clockwork policy;
+  FailsafeState state;
+  const FailsafeFlags outside = outside_from_the_first_sample(0);
+  while (state.state != ControllerState::kFault) {
+    state = policy.sample(outside);
+  }
+  state = after_reset({}, state, outside);
+  std::int64_t now_ns = 5000 * kMillisecond;
+  int samples = 0;
+  for (; state.state != ControllerState::kFault; now_ns += kMillisecond, ++samples) {
+    state = next_state({}, state, outside, now_ns);
+  }
+  EXPECT_EQ(samples, 1002);  // at 0, 1, ..., 1001 ms
 }
 
 TEST(Failsafe, when_a_stop_is_requested_expect_the_safe_torque_and_that_cause_before_any_other) {

@@ -211,7 +211,7 @@ TEST(FiveBarMotion, friction_only_takes_energy) {
   EXPECT_LT(energy, start - 1e-2);
 }
 
-TEST(FiveBarMotion, a_five_bar_that_falls_shut_is_stopped_by_name) {
+TEST(FiveBarMotion, F17_a_five_bar_that_falls_shut_is_stopped_by_name) {
   for (const char* integrator : {"ida", "rk4"}) {
     const FiveBar five_bar(thesis_five_bar());
     const auto falling = make_integrator(

@@ -227,7 +227,7 @@ TEST(IdaIntegrator, a_plant_with_an_algebraic_component_follows_its_analytic_sol
   EXPECT_NEAR(y[1], std::sin(2.0), 1e-8);
 }
 
-TEST(IdaIntegrator, when_the_tolerance_is_below_rounding_expect_the_flag_by_name_and_the_state_untouched) {
+TEST(IdaIntegrator, F17_when_the_tolerance_is_below_rounding_expect_the_flag_by_name_and_the_state_untouched) {
   const SerialArm arm(three_link_arm());
   IdaIntegrator ida(arm, IdaOptions{1e-30, 1e-30});
   VectorXd y(6);
@@ -255,7 +255,7 @@ TEST(IdaIntegrator, when_the_plant_is_undefined_from_the_start_expect_the_flag_b
   }
 }
 
-TEST(IdaIntegrator, when_the_plant_becomes_undefined_expect_flag_and_the_time_it_happened) {
+TEST(IdaIntegrator, F17_when_the_plant_becomes_undefined_expect_flag_and_the_time_it_happened) {
   const FilteredSine plant(0.0755);
   IdaIntegrator ida(plant, IdaOptions{});
   VectorXd y = plant.initial_state({-0.5}, {});

@@ -74,7 +74,7 @@ TEST_F(TwoEnds, when_several_measurements_are_pending_expect_only_the_newest) {
   EXPECT_EQ(controller_.counters().superseded, 2);
 }
 
-TEST_F(TwoEnds, when_packets_are_reordered_expect_the_old_ones_ignored_and_counted) {
+TEST_F(TwoEnds, F4_when_packets_are_reordered_expect_the_old_ones_ignored_and_counted) {
   for (const std::int64_t seq : {7, 5, 6}) {
     plant_.send(measurement(seq));
   }
@@ -85,7 +85,7 @@ TEST_F(TwoEnds, when_packets_are_reordered_expect_the_old_ones_ignored_and_count
   EXPECT_EQ(controller_.counters().old, 2);
 }
 
-TEST_F(TwoEnds, when_a_measurement_is_repeated_expect_it_counted_and_offered_again) {
+TEST_F(TwoEnds, F4_when_a_measurement_is_repeated_expect_it_counted_and_offered_again) {
   measurement_v1 received{};
   for (int i = 0; i < 3; ++i) {
     plant_.send(measurement(9));
@@ -96,7 +96,7 @@ TEST_F(TwoEnds, when_a_measurement_is_repeated_expect_it_counted_and_offered_aga
   EXPECT_EQ(controller_.counters().duplicates, 2);
 }
 
-TEST_F(TwoEnds, when_a_duplicate_differs_expect_the_first_one_kept) {
+TEST_F(TwoEnds, F4_when_a_duplicate_differs_expect_the_first_one_kept) {
   plant_.send(measurement(9, 1.0));
   plant_.send(measurement(9, 2.0));
   controller_.receive(kSecond);
@@ -105,7 +105,7 @@ TEST_F(TwoEnds, when_a_duplicate_differs_expect_the_first_one_kept) {
   EXPECT_EQ(received.angle_rad[0], 1.0);
 }
 
-TEST_F(TwoEnds, when_foreign_messages_arrive_expect_a_run_of_them_counted_until_a_good_one) {
+TEST_F(TwoEnds, F5_when_foreign_messages_arrive_expect_a_run_of_them_counted_until_a_good_one) {
   measurement_v1 foreign = measurement(1);
   foreign.joints = kIdentity.joints;
   Packet packet;
@@ -128,7 +128,68 @@ TEST_F(TwoEnds, when_foreign_messages_arrive_expect_a_run_of_them_counted_until_
   EXPECT_EQ(controller_.counters().accepted, 1);
 }
 
-TEST_F(TwoEnds, when_random_bytes_arrive_expect_each_counted_and_none_accepted) {
+Packet foreign_measurement() {
+  measurement_v1 foreign = measurement(1);
+  foreign.joints = kIdentity.joints;
+  foreign.session = kIdentity.session + 1;
+  foreign.artifact_hash = kIdentity.artifact_hash;
+  Packet packet;
+  encode(foreign, packet);
+  return packet;
+}
+
+TEST_F(TwoEnds, F5_when_a_good_message_ends_a_foreign_run_in_the_same_drain_expect_the_run_still_seen_once) {
+  const Packet packet = foreign_measurement();
+  for (int i = 0; i < 30; ++i) {
+    controller_.inject(Channel::kMeasurement, packet.bytes.data(), static_cast<std::size_t>(packet.size));
+  }
+  plant_.send(measurement(1));
+  controller_.receive(kSecond);
+  EXPECT_EQ(controller_.take_longest_wrong_run(), 30);
+  EXPECT_EQ(controller_.take_longest_wrong_run(), 0);
+}
+
+TEST_F(TwoEnds, F6_when_a_message_is_truncated_anywhere_or_of_another_type_expect_it_counted_and_not_accepted) {
+  measurement_v1 whole = measurement(1);
+  whole.joints = kIdentity.joints;
+  whole.session = kIdentity.session;
+  whole.artifact_hash = kIdentity.artifact_hash;
+  Packet packet;
+  encode(whole, packet);
+  for (int size = 0; size < packet.size; ++size) {
+    controller_.inject(Channel::kMeasurement, packet.bytes.data(), static_cast<std::size_t>(size));
+    controller_.receive(0);
+  }
+  EXPECT_EQ(controller_.counters().wrong_length, packet.size);
+  command_v1 command{};
+  encode(command, packet);
+  controller_.inject(Channel::kMeasurement, packet.bytes.data(), static_cast<std::size_t>(packet.size));
+  controller_.receive(0);
+  EXPECT_EQ(controller_.counters().wrong_length, measurement_v1{}.getEncodedSize() + 1);
+  EXPECT_EQ(controller_.counters().accepted, 0);
+}
+
+TEST_F(TwoEnds, when_several_events_arrive_at_once_expect_all_of_them_in_order) {
+  plant_.send(EventCode::kStarted, 0);
+  plant_.send(EventCode::kEnded, 9);
+  controller_.receive(kSecond);
+  event_v1 event{};
+  ASSERT_TRUE(controller_.take(event));
+  EXPECT_EQ(event.code, static_cast<std::int32_t>(EventCode::kStarted));
+  ASSERT_TRUE(controller_.take(event));
+  EXPECT_EQ(event.code, static_cast<std::int32_t>(EventCode::kEnded));
+  EXPECT_FALSE(controller_.take(event));
+}
+
+TEST_F(TwoEnds, when_more_events_wait_than_are_kept_expect_the_loss_counted) {
+  for (int i = 0; i < 11; ++i) {
+    plant_.send(EventCode::kStarted, i);
+  }
+  controller_.receive(kSecond);
+  EXPECT_EQ(controller_.counters().lost_events, 3);
+}
+
+TEST_F(TwoEnds, F6_when_random_bytes_arrive_expect_each_counted_and_none_accepted) {
   std::mt19937 random(3);
   constexpr int kPackets = 100'000;
   std::vector<std::uint8_t> noise(100 * kMaxMessageBytes);

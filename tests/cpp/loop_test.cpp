@@ -44,7 +44,7 @@ TEST(ControlLoop, when_artifact_and_trajectory_differ_in_joints_expect_refusal) 
   EXPECT_THROW(ControlLoop(two, trajectory(), {}), InputError);
 }
 
-TEST(ControlLoop, when_samples_are_missing_expect_the_steps_of_a_controller_without_measurement) {
+TEST(ControlLoop, F3_when_samples_are_missing_expect_the_steps_of_a_controller_without_measurement) {
   ControlLoop loop(artifact(), trajectory(), {});
   Controller controller(artifact());
   const Trajectory reference = trajectory();
@@ -67,7 +67,7 @@ TEST(ControlLoop, when_samples_are_missing_expect_the_steps_of_a_controller_with
   EXPECT_EQ(loop.state(), ControllerState::kRunning);
 }
 
-TEST(ControlLoop, when_20_samples_are_missing_expect_a_latched_fault_and_a_bounded_number_of_steps) {
+TEST(ControlLoop, F2_when_20_samples_are_missing_expect_a_latched_fault_and_a_bounded_number_of_steps) {
   for (const std::int64_t next : {21LL, 22LL, 1'000'000'000LL}) {
     ControlLoop loop(artifact(), trajectory(), {});
     loop.handle(reading(0), at(0));
@@ -78,7 +78,7 @@ TEST(ControlLoop, when_20_samples_are_missing_expect_a_latched_fault_and_a_bound
   }
 }
 
-TEST(ControlLoop, when_19_samples_are_missing_expect_no_fault) {
+TEST(ControlLoop, F3_when_19_samples_are_missing_expect_no_fault) {
   ControlLoop loop(artifact(), trajectory(), {});
   loop.handle(reading(0), at(0));
   loop.handle(reading(20), at(20));
@@ -86,7 +86,7 @@ TEST(ControlLoop, when_19_samples_are_missing_expect_no_fault) {
   EXPECT_EQ(loop.state(), ControllerState::kRunning);
 }
 
-TEST(ControlLoop, when_one_measurement_is_nan_expect_prediction_flag_and_a_normal_next_sample) {
+TEST(ControlLoop, F1_when_one_measurement_is_nan_expect_prediction_flag_and_a_normal_next_sample) {
   ControlLoop loop(artifact(), trajectory(), {});
   loop.handle(reading(0), at(0));
   loop.handle(reading(1, {kStart[0], kNaN, kStart[2]}), at(1));
@@ -103,7 +103,7 @@ TEST(ControlLoop, when_one_measurement_is_nan_expect_prediction_flag_and_a_norma
 
 class AfterAFault : public ::testing::TestWithParam<SafeAction> {};
 
-TEST_P(AfterAFault, reaches_the_safe_torque_within_50_ms_without_a_jump_and_stays_there) {
+TEST_P(AfterAFault, F2_reaches_the_safe_torque_within_50_ms_without_a_jump_and_stays_there) {
   LoopSettings settings;
   settings.safe_action = GetParam();
   ControlLoop loop(artifact(), trajectory(), settings);
@@ -141,6 +141,73 @@ TEST_P(AfterAFault, reaches_the_safe_torque_within_50_ms_without_a_jump_and_stay
 
 INSTANTIATE_TEST_SUITE_P(ControlLoop, AfterAFault, ::testing::Values(SafeAction::kZero, SafeAction::kGravity),
                          [](const auto& action) { return action.param == SafeAction::kZero ? "zero" : "gravity"; });
+
+/// A loop that latched a fault: 60 good samples, then 20 without angles. The next sample is 80.
+class LatchedFault : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (std::int64_t seq = 0; seq < 80; ++seq) {
+      loop_.handle(reading(seq, seq < 60 ? kStart : JointArray{kNaN, kNaN, kNaN}), at(seq));
+    }
+    ASSERT_EQ(loop_.state(), ControllerState::kFault);
+  }
+
+  ControlLoop loop_{artifact(), trajectory(), {}};
+};
+
+TEST_F(LatchedFault, keeps_the_50_samples_before_it_and_itself_as_the_last_one) {
+  loop_.handle(reading(80), at(80));  // what comes after does not push them out
+  const PostMortem& samples = loop_.post_mortem();
+  ASSERT_EQ(samples.size(), 50u);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(samples[i].seq, 30 + static_cast<std::int64_t>(i));
+  }
+  EXPECT_EQ(samples[48].state, static_cast<std::int32_t>(ControllerState::kDegraded));
+  EXPECT_EQ(samples[49].state, static_cast<std::int32_t>(ControllerState::kFault));
+}
+
+TEST_F(LatchedFault, is_not_left_while_angles_are_missing) {
+  EXPECT_FALSE(loop_.reset_fault());
+  EXPECT_EQ(loop_.state(), ControllerState::kFault);
+}
+
+TEST_F(LatchedFault, is_left_by_a_reset_from_the_torque_in_force_without_a_bump) {
+  constexpr double kStatedStep = 2.0 * 1500.0 * 1e-3 / 0.1;  // N m: limits, sample period, ramp
+  const JointArray away{kStart[0] + 0.4, kStart[1], kStart[2]};
+  for (std::int64_t seq = 80; seq < 150; ++seq) {
+    loop_.handle(reading(seq, away), at(seq));
+  }
+  EXPECT_EQ(torque_of(loop_), JointArray{});
+  ASSERT_TRUE(loop_.reset_fault());
+  EXPECT_EQ(loop_.state(), ControllerState::kReady);
+  JointArray previous{};
+  for (std::int64_t seq = 150; seq < 250; ++seq) {
+    loop_.handle(reading(seq, away), at(seq));
+    ASSERT_EQ(loop_.state(), ControllerState::kRunning);
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      ASSERT_LE(std::abs(torque_of(loop_)[j] - previous[j]), kStatedStep * (1 + 1e-12));
+    }
+    previous = torque_of(loop_);
+  }
+  EXPECT_NE(previous, JointArray{});
+  EXPECT_EQ(loop_.faults(), 1);
+  EXPECT_FALSE(loop_.reset_fault()) << "there is no fault to leave";
+}
+
+TEST(ControlLoop, when_samples_are_missing_expect_a_telemetry_sample_for_each_prediction) {
+  ControlLoop loop(artifact(), trajectory(), {});
+  auto ring = std::make_unique<SampleRing>();
+  loop.publish_to(ring.get());
+  loop.handle(reading(0), at(0));
+  loop.handle(reading(4), at(4));
+  telemetry_v1 sample;
+  for (std::int64_t seq = 0; seq <= 4; ++seq) {
+    ASSERT_TRUE(ring->pop(sample));
+    EXPECT_EQ(sample.seq, seq);
+    EXPECT_EQ((sample.flags & static_cast<std::int32_t>(kMeasurementInvalid)) != 0, seq % 4 != 0);
+  }
+  EXPECT_FALSE(ring->pop(sample));
+}
 
 /// A controller on a thread of its own; the test plays the plant.
 class RunningController : public ::testing::Test {
@@ -208,7 +275,7 @@ TEST_F(RunningController, when_a_measurement_is_repeated_in_lock_step_expect_the
   EXPECT_EQ(loop_.steps(), 1);
 }
 
-TEST_F(RunningController, when_a_measurement_is_repeated_in_real_time_expect_one_command) {
+TEST_F(RunningController, F4_when_a_measurement_is_repeated_in_real_time_expect_one_command) {
   ControllerRunSettings settings;
   settings.pace = Pace::kRealTime;
   settings.silence_s = 5.0;
@@ -222,7 +289,7 @@ TEST_F(RunningController, when_a_measurement_is_repeated_in_real_time_expect_one
   EXPECT_EQ(finish().commands, 1);
 }
 
-TEST_F(RunningController, when_the_plant_falls_silent_in_real_time_expect_a_fault_and_safe_torque_without_being_asked) {
+TEST_F(RunningController, F16_when_the_plant_falls_silent_expect_a_fault_and_safe_torque_without_being_asked) {
   ControllerRunSettings settings;
   settings.pace = Pace::kRealTime;
   settings.timeout_s = 0.5;
@@ -261,7 +328,7 @@ TEST_F(RunningController, when_a_fault_is_to_end_the_run_expect_an_end_after_the
   EXPECT_EQ(loop_.command().torque_nm[0], 0.0);
 }
 
-TEST_F(RunningController, when_asked_to_stop_expect_the_safe_torque_before_the_end) {
+TEST_F(RunningController, F16_when_asked_to_stop_expect_the_safe_torque_before_the_end) {
   start({});
   plant_.send(measurement(0, {0.5, 0.0, 0.0}));
   EXPECT_NE(await_command(0).torque_nm[0], 0.0);

@@ -29,7 +29,7 @@ struct Overrun {
 
 class OneOverrun : public testing::TestWithParam<Overrun> {};
 
-TEST_P(OneOverrun, continues_on_the_grid_without_a_burst) {
+TEST_P(OneOverrun, F12_continues_on_the_grid_without_a_burst) {
   Pacer pacer(kStart, kPeriod);
   const auto elapsed = static_cast<std::int64_t>(GetParam().periods * kPeriod);
   const std::int64_t tick = pacer.next(kStart + elapsed);
@@ -47,7 +47,7 @@ TEST_P(OneOverrun, continues_on_the_grid_without_a_burst) {
 INSTANTIATE_TEST_SUITE_P(Pacer, OneOverrun,
                          testing::Values(Overrun{1.5, 2}, Overrun{2.0, 2}, Overrun{2.5, 3}, Overrun{10.0, 10}));
 
-TEST(Pacer, when_cycles_take_random_times_expect_increasing_ticks_on_the_grid_never_in_the_past) {
+TEST(Pacer, F12_when_cycles_take_random_times_expect_increasing_ticks_on_the_grid_never_in_the_past) {
   std::mt19937_64 random(4);
   std::uniform_int_distribution<std::int64_t> duration(0, 5 * kPeriod);
   Pacer pacer(kStart, kPeriod);

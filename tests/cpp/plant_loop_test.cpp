@@ -137,7 +137,7 @@ TEST(PlantLoop, when_no_controller_answers_expect_an_end_after_the_timeout) {
   EXPECT_EQ(session.seq(), 0);
 }
 
-TEST(PlantLoop, when_commands_stop_in_real_time_expect_the_torque_held_for_20_ms_and_then_the_brake) {
+TEST(PlantLoop, F7_when_commands_stop_in_real_time_expect_the_torque_held_for_20_ms_and_then_the_brake) {
   constexpr std::int64_t kAnswered = 10;
   constexpr std::int64_t kSamples = 60;
   const Scenario experiment = scenario(kSamples);

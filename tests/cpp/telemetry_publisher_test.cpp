@@ -61,7 +61,7 @@ TEST(TelemetryPublisher, records_every_sample_in_order_with_numbers_that_read_ba
   std::filesystem::remove(path);
 }
 
-TEST(TelemetryPublisher, when_the_disk_is_full_expect_lost_rows_counted_and_no_other_harm) {
+TEST(TelemetryPublisher, F15_when_the_disk_is_full_expect_lost_rows_counted_and_no_other_harm) {
   if (!std::filesystem::exists("/dev/full")) {
     GTEST_SKIP() << "needs /dev/full";
   }
@@ -74,7 +74,7 @@ TEST(TelemetryPublisher, when_the_disk_is_full_expect_lost_rows_counted_and_no_o
   EXPECT_EQ(report.drops, 0);
 }
 
-TEST(TelemetryPublisher, when_more_arrives_than_the_ring_holds_expect_published_and_dropped_to_add_up) {
+TEST(TelemetryPublisher, F15_when_more_arrives_than_the_ring_holds_expect_published_and_dropped_to_add_up) {
   constexpr std::int64_t kSamples = 50'000;
   TelemetryPublisher publisher(std::move(InProcessLink::create_pair({1, 2, 3}).first), kPeriod, 3, "");
   for (std::int64_t seq = 0; seq < kSamples; ++seq) {

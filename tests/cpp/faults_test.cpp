@@ -1,0 +1,250 @@
+// Faults of docs/reference/faults.md at the loop and at the seam to the robot; each name carries its number.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "loop_fixture.hpp"
+#include "quasilpv/in_process_link.hpp"
+#include "quasilpv/link_robot.hpp"
+#include "quasilpv/run_controller.hpp"
+#include "scripted_robot.hpp"
+
+namespace quasilpv {
+namespace {
+
+using ::quasilpv::testing::artifact;
+using ::quasilpv::testing::artifact_table;
+using ::quasilpv::testing::at;
+using ::quasilpv::testing::identity_of;
+using ::quasilpv::testing::json_twin;
+using ::quasilpv::testing::kJoints;
+using ::quasilpv::testing::kLawKinds;
+using ::quasilpv::testing::kMillisecond;
+using ::quasilpv::testing::kSamplePeriod;
+using ::quasilpv::testing::kStart;
+using ::quasilpv::testing::measurement;
+using ::quasilpv::testing::reading;
+using ::quasilpv::testing::ScriptedRobot;
+using ::quasilpv::testing::trajectory;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::vector<RobotReading> readings(std::int64_t count) {
+  std::vector<RobotReading> result;
+  for (std::int64_t seq = 0; seq < count; ++seq) {
+    result.push_back(reading(seq));
+  }
+  return result;
+}
+
+ControllerRunReport run_in_real_time(ControlLoop& loop, Robot& robot) {
+  ControllerRunSettings settings;
+  settings.pace = Pace::kRealTime;
+  settings.silence_s = 60.0;
+  const std::atomic<bool> stop{false};
+  return run_controller(loop, robot, settings, stop);
+}
+
+/// All limits 1500 N m; 3 N m per sample.
+Artifact slow_actuators() {
+  Json table = artifact_table("dob-acceleration", kJoints);
+  table["limits"]["slew_nm_per_s"] = {3000.0, 3000.0, 3000.0};
+  return Artifact::parse(json_twin(table), "test");
+}
+
+TEST(Faults, F1_when_one_angle_is_not_a_number_expect_one_flag_and_a_torque_within_limit_and_slew) {
+  for (const double bad : {kNaN, kInfinity, -kInfinity}) {
+    ControlLoop loop(slow_actuators(), trajectory(), {});
+    for (std::int64_t seq = 0; seq < 100; ++seq) {
+      const JointArray before = loop.command().torque_nm;
+      loop.handle(reading(seq, {kStart[0] + 1e-4 * static_cast<double>(seq), seq == 50 ? bad : kStart[1], kStart[2]}),
+                  at(seq));
+      for (std::size_t j = 0; j < kJoints; ++j) {
+        ASSERT_LE(std::abs(loop.command().torque_nm[j]), 1500.0);
+        ASSERT_TRUE(seq == 0 || std::abs(loop.command().torque_nm[j] - before[j]) <= 3.0 + 1e-9);
+      }
+      EXPECT_EQ((loop.command().flags & kMeasurementInvalid) != 0, seq == 50);
+    }
+    EXPECT_EQ(loop.predicted_steps(), 1);
+    EXPECT_EQ(loop.state(), ControllerState::kRunning);
+  }
+}
+
+TEST(Faults, F4_when_an_older_reading_comes_later_expect_no_command_for_it) {
+  ScriptedRobot robot({reading(0), reading(2), reading(1), reading(2), reading(3)});
+  ControlLoop loop(artifact(), trajectory(), {});
+  run_in_real_time(loop, robot);
+  ASSERT_EQ(robot.commands().size(), 3u);
+  EXPECT_EQ(robot.commands()[1].seq, 2);
+  EXPECT_EQ(robot.commands()[2].seq, 3);
+}
+
+TEST(Faults, F5_when_100_foreign_messages_come_in_a_row_expect_a_latched_fault_and_at_99_none) {
+  for (const std::int64_t run : {99, 100}) {
+    ScriptedRobot robot(readings(2));
+    robot.set_foreign_run(run);
+    ControlLoop loop(artifact(), trajectory(), {});
+    run_in_real_time(loop, robot);
+    EXPECT_EQ(loop.cause(), run == 100 ? FaultCause::kForeignMessages : FaultCause::kNone);
+    EXPECT_EQ(loop.state(), run == 100 ? ControllerState::kFault : ControllerState::kRunning);
+  }
+}
+
+TEST(Faults, F9_when_outside_the_premise_box_expect_clamped_premises_then_degraded_then_fault) {
+  ControlLoop loop(artifact(), trajectory(), {});
+  auto ring = std::make_unique<SampleRing>();
+  loop.publish_to(ring.get());
+  for (std::int64_t seq = 0; seq <= 1001; ++seq) {
+    loop.handle(reading(seq, {2.5, -0.2, 0.4}), at(seq));  // cos(2.5) = -0.80 < -0.5, the lower bound
+    const ControllerState expected = seq <= 20     ? ControllerState::kRunning
+                                     : seq <= 1000 ? ControllerState::kDegraded
+                                                   : ControllerState::kFault;
+    ASSERT_EQ(loop.state(), expected) << seq;
+    ASSERT_NE(loop.command().flags & kPremiseOutsideBox, 0u);
+    telemetry_v1 sample;
+    ASSERT_TRUE(ring->pop(sample));
+    ASSERT_EQ(sample.premise[0], -0.5);
+  }
+  EXPECT_EQ(loop.cause(), FaultCause::kPremiseOutsideBox);
+}
+
+JointArray hold_torque(const JointArray& angle) {
+  JointArray torque{};
+  for (std::size_t j = 0; j < kJoints; ++j) {
+    torque[j] = 9.81 * static_cast<double>(j + 1) * std::sin(angle[j]);
+  }
+  return torque;
+}
+
+double largest_difference(const JointArray& a, const JointArray& b) {
+  double largest = 0.0;
+  for (std::size_t j = 0; j < a.size(); ++j) {
+    largest = std::max(largest, std::abs(a[j] - b[j]));
+  }
+  return largest;
+}
+
+/// 2 torque_nm T / ramp_s with 1500 N m, 1 ms, 0.1 s.
+constexpr double kStatedStep = 30.0;
+
+class Start : public ::testing::TestWithParam<const char*> {
+ protected:
+  static LoopSettings bumpless() {
+    LoopSettings settings;
+    settings.bumpless_start = true;
+    return settings;
+  }
+};
+
+// Half a radian away from the reference, and in the middle of the motion: sample 600 of a reference that moves.
+TEST_P(Start, F11_away_from_the_reference_begins_at_the_hold_torque_and_leaves_it_in_stated_steps) {
+  for (const std::int64_t first : {0, 600}) {
+    const JointArray away{kStart[0] + 0.5, kStart[1] - 0.5, kStart[2] + 0.5};
+    ControlLoop loop(artifact(GetParam()), trajectory(), bumpless());
+    JointArray previous = hold_torque(away);
+    for (std::int64_t seq = first; seq < first + 300; ++seq) {
+      JointArray angle = away;
+      for (double& moving : angle) {
+        moving += 1e-3 * static_cast<double>(seq - first);  // 1 rad/s
+      }
+      loop.handle(reading(seq, angle), at(seq));
+      const JointArray torque = loop.command().torque_nm;
+      if (seq < first + 100) {
+        ASSERT_LE(largest_difference(torque, previous), kStatedStep * (1 + 1e-12)) << "sample " << seq;
+      }
+      previous = torque;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Faults, Start, ::testing::ValuesIn(kLawKinds), [](const auto& kind) {
+  std::string name = kind.param;
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
+
+TEST(Faults, F11_when_the_first_readings_are_invalid_expect_no_torque_until_the_hold_torque_is_known) {
+  LoopSettings settings;
+  settings.bumpless_start = true;
+  ControlLoop loop(artifact(), trajectory(), settings);
+  loop.handle(reading(0, {kNaN, 0.0, 0.0}), at(0));
+  EXPECT_EQ(loop.command().torque_nm, JointArray{});
+  const JointArray away{1.0, -0.2, 0.4};
+  loop.handle(reading(1, away), at(1));
+  EXPECT_LE(largest_difference(loop.command().torque_nm, hold_torque(away)), kStatedStep);
+}
+
+TEST(Faults, F11_without_a_bumpless_start_the_first_torque_is_beyond_that_step) {
+  const JointArray away{1.0, -0.2, 0.4};
+  ControlLoop loop(artifact(), trajectory(), {});
+  loop.handle(reading(0, away), at(0));
+  EXPECT_GT(largest_difference(loop.command().torque_nm, hold_torque(away)), kStatedStep);
+}
+
+class Overrun : public ::testing::TestWithParam<double> {};
+
+TEST_P(Overrun, F12_is_counted_and_no_reading_is_answered_twice) {
+  constexpr std::int64_t kReadings = 10;
+  ScriptedRobot robot(readings(kReadings));
+  robot.slow_down(to_nanoseconds(GetParam() * kSamplePeriod));
+  ControlLoop loop(artifact(), trajectory(), {});
+  const ControllerRunReport report = run_in_real_time(loop, robot);
+  EXPECT_EQ(report.deadline_overruns, kReadings);
+  ASSERT_EQ(robot.commands().size(), static_cast<std::size_t>(kReadings));
+  for (std::int64_t seq = 0; seq < kReadings; ++seq) {
+    EXPECT_EQ(robot.commands()[static_cast<std::size_t>(seq)].seq, seq);
+  }
+  EXPECT_EQ(loop.state(), ControllerState::kDegraded);
+}
+
+INSTANTIATE_TEST_SUITE_P(Faults, Overrun, ::testing::Values(1.5, 2.5, 10.0), [](const auto& periods) {
+  return std::to_string(std::lround(10 * periods.param)) + "_tenths";
+});
+
+TEST(Faults, F12_when_more_than_20_deadlines_are_missed_in_a_row_expect_a_latched_fault) {
+  ScriptedRobot robot(readings(22));
+  robot.slow_down(3 * kMillisecond / 2);
+  ControlLoop loop(artifact(), trajectory(), {});
+  run_in_real_time(loop, robot);
+  EXPECT_EQ(robot.commands()[20].state, ControllerState::kDegraded);  // 20 overruns before it
+  EXPECT_EQ(robot.commands()[21].state, ControllerState::kFault);
+  EXPECT_EQ(loop.cause(), FaultCause::kDeadlineOverrun);
+}
+
+TEST(Faults, F15_when_nobody_empties_the_telemetry_ring_expect_the_same_commands_and_every_drop_counted) {
+  constexpr std::int64_t kSamples = static_cast<std::int64_t>(SampleRing::capacity()) + 1000;
+  auto ring = std::make_unique<SampleRing>();
+  ControlLoop watched(artifact(), trajectory(), {});
+  watched.publish_to(ring.get());
+  ControlLoop alone(artifact(), trajectory(), {});
+  for (std::int64_t seq = 0; seq < kSamples; ++seq) {
+    watched.handle(reading(seq), at(seq));
+    alone.handle(reading(seq), at(seq));
+    ASSERT_EQ(watched.command().torque_nm, alone.command().torque_nm);
+  }
+  EXPECT_EQ(ring->drops(), 1000);
+}
+
+// Simulated time is the sample index; no clock of the machine takes part in the commands.
+TEST(Faults, F18_the_commands_of_a_lock_step_run_do_not_depend_on_when_they_are_computed) {
+  ControlLoop first(artifact(), trajectory(), {});
+  ControlLoop second(artifact(), trajectory(), {});
+  for (std::int64_t seq = 0; seq < 100; ++seq) {
+    first.handle(reading(seq), at(seq));
+  }
+  sleep_until(monotonic_ns() + 5 * kMillisecond);
+  for (std::int64_t seq = 0; seq < 100; ++seq) {
+    second.handle(reading(seq), at(seq));
+  }
+  EXPECT_EQ(first.command().torque_nm, second.command().torque_nm);
+}
+
+}  // namespace
+}  // namespace quasilpv
