@@ -41,6 +41,7 @@ ANSWER = {
     "proved": bool,
     "inertia_margin": list,
     "delay_margin_s": float,
+    "proved_in_motion": type(None),
     "needed_range": list,
     "worst_growth_rate_per_s": float,
     "where": dict,

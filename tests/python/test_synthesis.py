@@ -68,7 +68,7 @@ def test_when_the_specification_changes_expect_another_design_hash() -> None:
     ("specification", "reason"),
     [
         (Specification(torque_activity=1e-5), r"torque increments of 0\.0204 N m rms, the quietest .* has \d"),
-        (Specification(margin_spare=9.0), r"margin must span 495 to 1, the widest found spans \d"),
+        (Specification(margin_spare=9.0), r"inertias must span 495 to 1, the widest found spans \d"),
     ],
 )
 def test_when_the_specification_cannot_be_met_expect_one_line_that_says_why(

@@ -15,7 +15,8 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 from quasilpv.certificate.exact_matrices import magnitude, zero
-from quasilpv.certificate.gate_cells import Pencil
+from quasilpv.certificate.gate_cells import FloatArray, Pencil
+from quasilpv.certificate.gate_rationals import to_floats
 
 Combination: TypeAlias = tuple[int, ...]
 Powers: TypeAlias = tuple[fmpq_mat, ...]
@@ -67,6 +68,15 @@ class CosineMatrix:
     def magnitude(self) -> fmpq_mat:
         """Bound on the absolute value of every entry, for f in [0, 1]; the error is left out."""
         return sum((magnitude(C) for powers in self.terms.values() for C in powers), self.rest * 0)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """The matrix in doubles, (N, n, n), at points (delta, f), (N, n)."""
+        total = np.zeros((len(points), self.rest.nrows(), self.rest.ncols()))
+        for combination, powers in self.terms.items():
+            cosine = np.cos(points[:, :-1] @ np.array(combination, dtype=float))
+            for power, C in enumerate(powers):
+                total += (cosine * points[:, -1] ** power)[:, None, None] * to_floats(C)
+        return total
 
     def to_pencil(self) -> Pencil:
         """The symmetric matrix as a pencil for the test of cells."""

@@ -21,6 +21,7 @@ from quasilpv.certificate.gate_data import HALF_A_SAMPLE, inertia_data, loop_dat
 from quasilpv.certificate.gate_delay import DelayMargin, delay_margin
 from quasilpv.certificate.gate_loop import AccelerationLoopData, CharacteristicPolynomial, Controller
 from quasilpv.certificate.gate_margin import InertiaMargin, inertia_margin
+from quasilpv.certificate.gate_motion import is_proved_in_motion
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, Place, needed_range
 from quasilpv.certificate.gate_rationals import float_at_most, to_float
 
@@ -50,6 +51,8 @@ class RobustGate:
         needed: which ratios occur; None if no bounds could be proved.
         delays: up to which delay the needed range is inside; None without a needed range.
         worst: numerical worst case over the needed range; None without one.
+        motion: whether one Lyapunov function is proved common to all motions (`gate_motion`); None if the artifact does
+            not claim it.
     """
 
     loop: AccelerationLoopData
@@ -58,10 +61,16 @@ class RobustGate:
     needed: NeededRange | None
     delays: DelayMargin | None
     worst: WorstCase | None
+    motion: bool | None = None
 
     @property
     def passed(self) -> bool:
-        """Whether the needed range is proved inside the margin for every constant delay up to the specified one."""
+        """Whether the needed range is proved inside the margin for every constant delay up to the specified one.
+
+        If the artifact claims more, one Lyapunov function for all motions, that must be proved as well.
+        """
+        if self.motion is False:
+            return False
         if self.margin is None or self.needed is None or self.delays is None or self.delays.proved is None:
             return False
         inside = self.margin.contains(self.needed.lowest, self.needed.highest)
@@ -92,6 +101,7 @@ class RobustGate:
             "proved": self.passed,
             "inertia_margin": None if self.margin is None else list(self.margin.to_floats()),
             "delay_margin_s": self.delay_margin_s,
+            "proved_in_motion": self.motion,
             "needed_range": None if self.needed is None else list(self.needed.to_floats()),
             "worst_growth_rate_per_s": None if worst is None else worst.growth_rate_per_s,
             "where": where,
@@ -119,7 +129,9 @@ def robust_gate(
         return RobustGate(loop, delay_samples, margin, None, None, None)
     delays = delay_margin(loop, needed.lowest, needed.highest)
     worst = worst_case(loop, inertia, needed, (fmpq(0), delay_samples))
-    return RobustGate(loop, delay_samples, margin, needed, delays, worst)
+    claimed = (document["witness"] or {}).get("motion")
+    motion = None if claimed is None else is_proved_in_motion(claimed, loop, inertia, source)
+    return RobustGate(loop, delay_samples, margin, needed, delays, worst, motion)
 
 
 @dataclass(frozen=True, eq=False)

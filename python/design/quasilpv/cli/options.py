@@ -16,7 +16,7 @@ from quasilpv.synthesis import CONTROLLERS, Specification, controller_kind
 from quasilpv.synthesis.acceleration_design import Progress
 from quasilpv.systems.registry import robot
 
-SHORT_NAMES = {"acceleration": "dob-acceleration", "torque": "dob-torque"}
+SHORT_NAMES = {"acceleration": "dob-acceleration", "moving": "dob-moving", "torque": "dob-torque"}
 
 RateOption: TypeAlias = Annotated[
     float | None,

@@ -100,6 +100,10 @@ def _rows(gate: RobustGate) -> list[tuple[str, str]]:
         (f"inertia margin with {to_float(gate.specified_delay_samples):g} samples of delay", margin),
         ("needed range of M_t/M_n", needed),
         ("delay margin", _delay(gate)),
+        (
+            "one Lyapunov function for all motions",
+            {None: "not claimed", True: "proved", False: "NOT proved"}[gate.motion],
+        ),
     ]
     if gate.worst is not None:
         place = gate.worst.place
@@ -124,6 +128,10 @@ def _delay(gate: RobustGate) -> str:
 
 
 def _verdict(gate: RobustGate) -> str:
+    if gate.motion is False:
+        return "NOT passed: that one Lyapunov function is common to all motions is claimed and not proved"
+    if gate.passed and gate.motion:
+        return "passed: proved for every motion, payload and constant delay up to the specified one"
     if gate.passed:
         return "passed: proved for every posture, payload and constant delay up to the specified one (frozen loop)"
     if gate.margin is None:

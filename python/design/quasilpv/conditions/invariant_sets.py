@@ -83,7 +83,7 @@ def sampled_peak_set(transition: FloatArray, inputs: FloatArray, output: FloatAr
 
     def least(multiplier: float, spare: FloatArray | float = 0.0) -> FloatArray:
         shrunk = transition / math.sqrt(multiplier)
-        X = scipy.linalg.solve_discrete_lyapunov(shrunk, inputs / (1.0 - multiplier) + spare)
+        X = scipy.linalg.solve_discrete_lyapunov(shrunk, inputs / (1.0 - multiplier) + spare, method="bilinear")
         return np.asarray((X + X.T) / 2.0)
 
     slowest = float(np.max(np.abs(np.linalg.eigvals(transition)))) ** 2

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from quasilpv.errors import InputError
 from quasilpv.synthesis import baselines, stabilisation, tuned_baselines
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
-from quasilpv.synthesis.acceleration_law import acceleration_law
+from quasilpv.synthesis.acceleration_law import acceleration_law, moving_acceleration_law
 from quasilpv.synthesis.hinf_tracking import hinf_tracking
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.torque_law import premultiplied_torque_law, torque_law
@@ -73,6 +73,9 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
         "dob-torque for the equations of motion times the robot's own matrix beta (Dehak 2022, IV.5.2)",
         premultiplied_torque_law,
         rate_hz=4000.0,
+    ),
+    "dob-moving": ControllerKind(
+        "dob-acceleration with one Lyapunov function for all motions, proved; positions only", moving_acceleration_law
     ),
     "dob-acceleration": ControllerKind(
         "disturbance-observer tracking at the acceleration level, positions only (default)", acceleration_law

@@ -2,8 +2,8 @@
 
 For every pair of bandwidths the gains come from the conditions of `quasilpv.conditions.sampled_chains`; the search
 is only over four numbers: feedback bandwidth, observer bandwidth, filter time constant, and the scale of the design
-inertia ``M_n = s M_nominal``. The scale costs nothing to optimise: if the loop tolerates ``M_t / M_n`` in [lo, hi] and
-the plant needs [a, b] relative to the nominal inertia, every s in [b/hi, a/lo] is admissible.
+inertia ``M_n = s M_nominal``. The scale costs nothing to optimise: the admissible ones are an interval
+(`quasilpv.synthesis.tolerance`).
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from quasilpv.conditions.sampled_chains import ChainGains, feedback_gains, obser
 from quasilpv.errors import InfeasibleError
 from quasilpv.synthesis.inertia_range import InertiaRange, largest_inertia_norm, needed_inertia_range
 from quasilpv.synthesis.inertia_schedule import Schedule
+from quasilpv.synthesis.moving_inertia import InertiaDisc, needed_disc
 from quasilpv.synthesis.sampled_loop import AccelerationLaw, SampledLoop
 from quasilpv.synthesis.specification import Specification
+from quasilpv.synthesis.tolerance import FrozenTolerance, MovingTolerance, Tolerance
 from quasilpv.systems.registry import Robot
 
 # Search grid, in units of the sample rate (bandwidths) and of the sample period (filter).
@@ -66,7 +68,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class AccelerationDesign:
-    """The chosen candidate with its evidence."""
+    """The chosen candidate with its evidence; the disc of its design inertia if a moving robot was asked for."""
 
     candidate: Candidate
     feedback: ChainGains
@@ -74,6 +76,7 @@ class AccelerationDesign:
     inertia_range: InertiaRange
     growth_rates: dict[str, tuple[float, float]]
     candidates_tried: int
+    disc: InertiaDisc | None = None
 
     def report(self) -> dict[str, Any]:
         """The numbers a person asks for, JSON-able."""
@@ -102,6 +105,7 @@ class _Search:
     robot: Robot
     specification: Specification
     needed: InertiaRange
+    tolerance: Tolerance
     activity_bound_nm: float
     noise_nm: float
     feedback: dict[float, ChainGains] = field(default_factory=dict)
@@ -109,7 +113,7 @@ class _Search:
     tried: int = 0
     best: Candidate | None = None
     best_point: tuple[float, float, float] | None = None
-    widest_margin: float = 0.0
+    widest_span: float = 0.0
     quietest_nm: float = math.inf
 
     def gains(self, wc: float, wo: float) -> tuple[ChainGains, ChainGains] | None:
@@ -135,15 +139,13 @@ class _Search:
 
     def _better_candidates(self, law: AccelerationLaw, bandwidths: tuple[float, float]) -> Iterator[Candidate]:
         """Admissible candidates of one law, over the scale of the design inertia, that beat the best so far."""
-        margin = SampledLoop(law, self.specification.delay_s).inertia_margin()
-        if margin is None or margin[0] == 0.0:
+        found = self.tolerance.tolerated(law)
+        if found is None:
             return
-        spare = self.specification.margin_spare
-        smallest = self.needed.highest * spare / margin[1]
-        largest = self.needed.lowest / (margin[0] * spare)
-        self.widest_margin = max(self.widest_margin, margin[1] / margin[0])
-        if smallest > largest:
+        self.widest_span = max(self.widest_span, found.span)
+        if found.scales is None:
             return
+        smallest, largest = found.scales
         loop = SampledLoop(law)
         for scale in (smallest, math.sqrt(smallest * largest), largest):
             needed = (self.needed.lowest / scale, self.needed.highest / scale)
@@ -155,11 +157,16 @@ class _Search:
             torque = max(loop.command_activity(ratio) for ratio in ratios) * self.noise_nm * scale
             self.quietest_nm = min(self.quietest_nm, torque)
             if torque <= self.activity_bound_nm:
-                yield Candidate(law, scale, margin, needed, gain, torque, bandwidths)
+                yield Candidate(law, scale, found.margin, needed, gain, torque, bandwidths)
 
 
 def design_acceleration_law(
-    robot: Robot, specification: Specification, progress: Progress = no_progress, scheduled: Schedule | None = None
+    robot: Robot,
+    specification: Specification,
+    progress: Progress = no_progress,
+    *,
+    scheduled: Schedule | None = None,
+    moving: bool = False,
 ) -> AccelerationDesign:
     """Choose bandwidths, filter and design inertia, and return the gains with their evidence.
 
@@ -168,15 +175,20 @@ def design_acceleration_law(
         specification: what is asked for.
         progress: called with (points done, points in all).
         scheduled: the design inertia by only some of its premises; None for all of them.
+        moving: demand a Lyapunov function common to all postures and payloads (`MovingTolerance`), not only stability
+            in each of them.
 
     Raises:
         InfeasibleError: no point of the search meets the margins and the torque activity.
     """
     needed = needed_inertia_range(robot, scheduled=scheduled)
+    frozen = FrozenTolerance(specification, needed)
+    disc = needed_disc(robot, scheduled) if moving else None
     search = _Search(
         robot,
         specification,
         needed,
+        frozen if disc is None else MovingTolerance(frozen, disc),
         activity_bound_nm=specification.torque_activity * float(np.linalg.norm(robot.limits.torque_nm)),
         noise_nm=specification.angle_noise_rad * largest_inertia_norm(robot),
     )
@@ -201,18 +213,17 @@ def design_acceleration_law(
         needed,
         _growth_rates(search.best, specification),
         search.tried,
+        None if disc is None else disc.scaled(search.best.inertia_scale),
     )
 
 
 def _why_not(search: _Search) -> str:
     """One line: which requirement no point of the search met, wanted and found."""
-    wanted, needed = search.specification, search.needed
-    width = needed.highest / needed.lowest * wanted.margin_spare**2
+    wanted = search.specification
     about = f"{search.robot.id}: no dob-acceleration design at {wanted.rate_hz:g} Hz"
     if math.isinf(search.quietest_nm):
-        return (
-            f"{about}: the inertia margin must span {width:.3g} to 1, the widest found spans {search.widest_margin:.3g}"
-        )
+        spans = f"must span {search.tolerance.span:.3g} to 1, the widest found spans {search.widest_span:.3g}"
+        return f"{about}: the tolerated inertias {spans}"
     return (
         f"{about}: encoder quantisation may cause torque increments of {search.activity_bound_nm:.3g} N m rms, "
         f"the quietest design inside the margin has {search.quietest_nm:.3g}"

@@ -1,4 +1,8 @@
-"""The default tracking law `dob-acceleration`, from robot and specification to a design with its witness."""
+"""The tracking law `dob-acceleration`, from robot and specification to a design with its witness.
+
+Two controllers have this law: `dob-acceleration`, the default, stable in every posture with every payload; and
+`dob-moving`, with one Lyapunov function for all of them, whatever the motion.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,18 @@ def acceleration_law(robot: Robot, specification: Specification, progress: Progr
     Raises:
         InfeasibleError: no design meets the specification.
     """
-    design = design_acceleration_law(robot, specification, progress)
+    return _law(robot, specification, progress, moving=False)
+
+
+def moving_acceleration_law(
+    robot: Robot, specification: Specification, progress: Progress = no_progress
+) -> TrackingDesign:
+    """Design `dob-moving`: arguments and errors as of `acceleration_law`."""
+    return _law(robot, specification, progress, moving=True)
+
+
+def _law(robot: Robot, specification: Specification, progress: Progress, *, moving: bool) -> TrackingDesign:
+    design = design_acceleration_law(robot, specification, progress, moving=moving)
     made = acceleration_law_of(robot, specification, design)
     period, bandwidth = specification.sample_period_s, design.candidate.bandwidths[0]
     envelope = acceleration_envelope(robot, dict(made.law), period, bandwidth)
@@ -39,9 +54,10 @@ def acceleration_law_of(robot: Robot, specification: Specification, design: Acce
         design: scalars and evidence.
     """
     scalars = design.candidate.law
+    controller = "dob-acceleration" if design.disc is None else "dob-moving"
     kp, kd, ki = (float(gain) for gain in scalars.feedback)
     return TrackingDesign(
-        controller="dob-acceleration",
+        controller=controller,
         robot=robot,
         sample_period_s=specification.sample_period_s,
         law={
@@ -53,18 +69,22 @@ def acceleration_law_of(robot: Robot, specification: Specification, design: Acce
             "inertia": inertia_table(robot, design.candidate.inertia_scale),
         },
         expressions=premise_and_gravity(robot),
-        inputs={"controller": "dob-acceleration", "specification": specification.to_document()},
+        inputs={"controller": controller, "specification": specification.to_document()},
         report=design.report(),
-        witness=_witness(design),
+        witness=_witness(design, specification),
     )
 
 
-def _witness(design: AccelerationDesign) -> dict[str, Any]:
+def _witness(design: AccelerationDesign, specification: Specification) -> dict[str, Any]:
     """The points of the two conditions, in their own time unit, and the bandwidths that fix their data."""
     wc, wo = design.candidate.bandwidths
+    motion = {}
+    if design.disc is not None:
+        motion = {"motion": {**design.disc.to_document(), "longest_delay_samples": specification.delay_samples}}
     return {
         "feedback": {"condition": "sampled-feedback", "bandwidth_rad_s": wc, **_point(design.feedback, "P")},
         "observer": {"condition": "sampled-observer", "bandwidth_rad_s": wo, **_point(design.observer, "Q")},
+        **motion,
     }
 
 

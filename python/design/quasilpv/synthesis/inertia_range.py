@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from quasilpv.loops.loop_grid import configurations
 from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.systems.registry import Robot
+
+FloatArray = npt.NDArray[np.float64]
 
 CONFIGURATIONS = 2000
 PAYLOAD_FRACTIONS = 9
@@ -24,6 +27,13 @@ class InertiaRange:
     where_highest: tuple[tuple[float, ...], float]
 
 
+def design_inertia(robot: Robot, postures: FloatArray, scheduled: Schedule | None = None) -> FloatArray:
+    """The nominal inertia, or what a schedule by only some of its premises makes of it, at postures, (N, n, n)."""
+    if scheduled is not None:
+        return scheduled.inertia_at(robot, postures)
+    return np.array([robot.model.inertia(theta) for theta in postures])
+
+
 def needed_inertia_range(robot: Robot, count: int = CONFIGURATIONS, scheduled: Schedule | None = None) -> InertiaRange:
     """Range of ``M_t / M_n`` over a grid of reachable configurations and payloads.
 
@@ -33,8 +43,7 @@ def needed_inertia_range(robot: Robot, count: int = CONFIGURATIONS, scheduled: S
     is not even positive definite. A grid, so a numerical range: the proof is the business of the certificate.
     """
     postures = configurations(robot.domain.angle_rad, count, every_joint=not robot.model.turns_as_one)
-    nominal = np.array([robot.model.inertia(theta) for theta in postures])
-    factor = np.linalg.cholesky(nominal if scheduled is None else scheduled.inertia_at(robot, postures))
+    factor = np.linalg.cholesky(design_inertia(robot, postures, scheduled))
     found: list[tuple[float, float, int, int, float]] = []
     for fraction in np.linspace(0.0, 1.0, PAYLOAD_FRACTIONS):
         plant = robot.with_payload_fraction(float(fraction))

@@ -57,11 +57,13 @@ def acceleration_envelope(
     )
     angle = np.eye(8)[:1]
     margin = reference_margin(robot)
-    box = _level_set(robot, errors, angle, sample_period_s)
-    torque = _level_set(robot, errors, errors.acceleration, sample_period_s)
+    reachable = sampled_peak_set(errors.transition, errors.disturbance, angle)
+    scale = np.sqrt(reachable.X.diagonal())
+    box = _level_set(robot, errors, angle, scale, sample_period_s)
+    torque = _level_set(robot, errors, errors.acceleration, scale, sample_period_s)
     most = TORQUE_SHARE * np.array(robot.limits.torque_nm) / _largest_row_sums(law["inertia"])
     level = float(most.min()) / torque["bounds"]["acceleration_rad_s2"] * (1.0 - ROUNDING)
-    disturbance = _peak_set(errors, sampled_peak_set(errors.transition, errors.disturbance, angle), 4)
+    disturbance = _peak_set(errors, reachable, 4)
     reference = sampled_peak_set(errors.transition[:3, :3], errors.reference, angle[:, :3])
     return {
         "condition": "sampled-envelope",
@@ -95,14 +97,22 @@ def verified_solution(problem: Problem, about: str) -> Solution:
     return solution
 
 
-def _level_set(robot: Robot, errors: SampledErrors, output: FloatArray, sample_period_s: float) -> dict[str, Any]:
-    """Wide along errors of angle and of speed, and along the step of a disturbance the observer has not seen yet."""
+def _level_set(
+    robot: Robot, errors: SampledErrors, output: FloatArray, scale: FloatArray, sample_period_s: float
+) -> dict[str, Any]:
+    """Wide along errors of angle and of speed, and along the step of a disturbance the observer has not seen yet.
+
+    The inequalities are stated for the states over what a disturbance makes of them (``scale``): a fast observer beside
+    a slow feedback spreads the states over many orders of magnitude.
+    """
     slowest = -float(np.log(np.max(np.abs(np.linalg.eigvals(errors.transition))))) / sample_period_s
     decay = DECAY_SHARE * slowest
     rows = np.eye(8)
     directions = np.column_stack([rows[0], rows[1], rows[5] + rows[7]])
-    problem, P = sampled_level_set(errors.transition, output, directions, 1.0 - 2.0 * decay * sample_period_s)
-    value = verified_solution(problem, robot.id).values[P]
+    scaled = errors.transition * scale / scale[:, None]
+    shrink = 1.0 - 2.0 * decay * sample_period_s
+    problem, P = sampled_level_set(scaled, output * scale, directions * (scale[0] / scale[:, None]), shrink)
+    value = verified_solution(problem, robot.id).values[P] / np.outer(scale, scale)
     shipped = value / np.outer(errors.units, errors.units)
     return {
         "P": ((shipped + shipped.T) / 2.0).tolist(),
