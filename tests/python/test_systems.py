@@ -117,7 +117,7 @@ def test_descriptor_model_of_an_arm_is_its_forward_dynamics(arm: PlanarSerialArm
 
 
 def test_registry_knows_all_robots_and_gives_each_one_line() -> None:
-    assert {entry.id for entry in robots()} == {"arm2", "arm2-upright", "arm3", "arm3-light", "fivebar"}
+    assert {entry.id for entry in robots()} == {"arm2", "arm2-upright", "arm3", "arm3-light", "fivebar", "spring-disc"}
     for entry in robots():
         assert robot(entry.id) == entry
         assert entry.summary

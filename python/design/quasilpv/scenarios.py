@@ -239,7 +239,8 @@ class TrackingTask:
         robot: id of a robot.
         trajectory: from the robot and its operating domain to the reference.
         external_torque: sines on the joints.
-        initial_angle_rad: angles of the plant at t = 0, at rest; None to start on the reference.
+        initial_angle_rad: angles of the plant at t = 0; None to start on the reference.
+        initial_speed_rad_s: its speeds then; None for rest. Only with angles.
     """
 
     id: str
@@ -248,6 +249,7 @@ class TrackingTask:
     trajectory: Callable[[Kinematics, OperatingDomain | None], Trajectory]
     external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE
     initial_angle_rad: Vector | None = None
+    initial_speed_rad_s: Vector | None = None
 
 
 def _stabilisation(name: str, summary: str, robot_id: str, joints: int) -> TrackingTask:
@@ -273,6 +275,15 @@ def tracking_tasks() -> tuple[TrackingTask, ...]:
         _stabilisation("stabilise-arm2", "the hanging 2-DoF arm comes to rest from 22.5 degrees", "arm2", 2),
         _stabilisation("stabilise-arm2-upright", "the same around its upper equilibrium", "arm2-upright", 2),
         _stabilisation("stabilise-arm3", "the light 3-DoF arm comes to rest from 22.5 degrees", "arm3-light", 3),
+        TrackingTask(
+            "stabilise-spring-disc",
+            "the disc comes to rest from x_1 = -5 m, x_2 = 10 m/s (Dehak 2022, fig. III.4)",
+            "spring-disc",
+            lambda _, __: rest("stabilise-spring-disc", 1, 10.0),
+            (),
+            initial_angle_rad=(-2.5,),
+            initial_speed_rad_s=(5.0,),
+        ),
     )
 
 
@@ -298,6 +309,7 @@ def build_scenario(
     external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE,
     transport_delay_s: float = 0.0,
     initial_angle_rad: Vector | None = None,
+    initial_speed_rad_s: Vector | None = None,
 ) -> Scenario:
     """Return the experiment in which ``robot`` tracks ``trajectory``.
 
@@ -310,7 +322,8 @@ def build_scenario(
         integrator: default ``IdaIntegrator()``.
         external_torque: sines on the joints, default (III.53).
         transport_delay_s: time from a sample to the moment its torque acts.
-        initial_angle_rad: start at rest at these angles; default: on the reference, moving with it.
+        initial_angle_rad: start at these angles; default: on the reference, moving with it.
+        initial_speed_rad_s: start there with these speeds; default: at rest.
 
     Raises:
         InputError: robot and trajectory do not fit, or a value is out of range.
@@ -321,7 +334,8 @@ def build_scenario(
     start = trajectory.evaluate(0.0)
     initial = {"angle_rad": start.angle.tolist(), "speed_rad_s": start.speed.tolist()}
     if initial_angle_rad is not None:
-        initial = {"angle_rad": list(initial_angle_rad), "speed_rad_s": [0.0] * robot.model.joints}
+        speed = initial_speed_rad_s or (0.0,) * robot.model.joints
+        initial = {"angle_rad": list(initial_angle_rad), "speed_rad_s": list(speed)}
     document = {
         "schema": "quasilpv.scenario",
         "schema_version": 1,

@@ -9,14 +9,15 @@ from flint import fmpq, fmpq_mat
 
 from quasilpv.certificate.gate_inertia import InertiaBlock, InertiaData, Pair
 from quasilpv.certificate.gate_loop import AccelerationLoopData
-from quasilpv.certificate.gate_mechanism import mechanism_data
+from quasilpv.certificate.gate_mechanism import DiscData, MechanismData, mechanism_data
 from quasilpv.errors import InputError
 
 LAW_KIND = "dob-acceleration"
 HALF_A_SAMPLE = fmpq(1, 2)
 """The transport delay a gate asks for if nobody says otherwise."""
 
-PAYLOAD_RULE = {"inertia_about_com": "unchanged", "fraction": [0.0, 1.0]}
+DISC_RULE = {"fraction": [0.0, 1.0]}
+PAYLOAD_RULE = {"inertia_about_com": "unchanged", **DISC_RULE}
 
 
 def law_kind(document: Mapping[str, Any], source: str, known: Collection[str]) -> str:
@@ -68,10 +69,7 @@ def inertia_data(document: Mapping[str, Any], source: str = "artifact") -> Inert
             or a premise is not the cosine of a difference of absolute angles.
     """
     mechanism = mechanism_data(document["robot"]["parameters"], source)
-    payloads = document["payloads"]
-    for field, rule in PAYLOAD_RULE.items():
-        if payloads.get(field) != rule:
-            raise InputError(source, f"payloads.{field}", payloads.get(field), str(rule))
+    mass_scale, com_scale = _payload_scales(document["payloads"], mechanism, source)
     inertia = document["law"]["inertia"]
     blocks = tuple(
         InertiaBlock(
@@ -87,14 +85,27 @@ def inertia_data(document: Mapping[str, Any], source: str = "artifact") -> Inert
         blocks, lower, upper, code = (InertiaBlock((), tuple(vertices)),), (), (), []
     return InertiaData(
         mechanism=mechanism,
-        mass_scale=tuple(map(float, payloads["mass_scale"])),
-        com_scale=tuple(map(float, payloads["com_scale"])),
+        mass_scale=mass_scale,
+        com_scale=com_scale,
         angle_rad=tuple((float(low), float(high)) for low, high in document["domain"]["angle_rad"]),
         premise_lower=lower,
         premise_upper=upper,
         premise_pairs=cosine_pairs(code, mechanism.absolute_map, source),
         blocks=blocks,
     )
+
+
+def _payload_scales(
+    payloads: Mapping[str, Any], mechanism: MechanismData, source: str
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Factors of masses and of distances to centres of mass at payload fraction 1; of a disc, of its inertia and 1."""
+    rules = DISC_RULE if isinstance(mechanism, DiscData) else PAYLOAD_RULE
+    for field, rule in rules.items():
+        if payloads.get(field) != rule:
+            raise InputError(source, f"payloads.{field}", payloads.get(field), str(rule))
+    if isinstance(mechanism, DiscData):
+        return (float(payloads["inertia_scale"]),), (1.0,)
+    return tuple(map(float, payloads["mass_scale"])), tuple(map(float, payloads["com_scale"]))
 
 
 def cosine_pairs(code: Sequence[Sequence[Any]], absolute_map: fmpq_mat, source: str = "artifact") -> tuple[Pair, ...]:

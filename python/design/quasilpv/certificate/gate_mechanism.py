@@ -10,6 +10,10 @@ moment of inertia about the centre of mass, so that D is a cubic polynomial of f
       D_kk = I_k + L_k^2 sum_{l>k} m_l,    D_kl = L_k (m_l r_l + L_l sum_{p>l} m_p)  for k < l
       h_k = m_k r_k + L_k sum_{l>k} m_l
 
+* **Rolling disc** of mass M and radius r, its angle the one joint, its moment of inertia J scaled by ``mass_scale``:
+
+      D = J (1 + f (mass_scale - 1)) + M r^2,    h = 0
+
 * **Five-bar linkage with equal links** (length a; active and passive link of masses m_a, m_b), a rhombus whose passive
   links are parallel to the opposite active ones: S the identity;
 
@@ -172,6 +176,38 @@ class FiveBarData:
         return active, passive
 
 
+@dataclass(frozen=True)
+class DiscData:
+    """A disc that rolls on a line.
+
+    Attributes:
+        mass_kg, radius_m, inertia_kg_m2: M, r and J about its centre; what a payload scales is J.
+    """
+
+    mass_kg: float
+    radius_m: float
+    inertia_kg_m2: float
+
+    @property
+    def joints(self) -> int:
+        """The disc."""
+        return 1
+
+    @property
+    def absolute_map(self) -> fmpq_mat:
+        """The identity."""
+        return identity(1)
+
+    def inertia(self, mass_scale: Sequence[float], com_scale: Sequence[float]) -> Polynomials:
+        """D of the module's formula."""
+        J = rational(self.inertia_kg_m2) * fmpq_poly([1, rational(mass_scale[0]) - 1])
+        return [[J + rational(self.mass_kg) * rational(self.radius_m) ** 2]]
+
+    def first_moments(self, mass_scale: Sequence[float], com_scale: Sequence[float]) -> list[fmpq_poly]:
+        """Zero: it rolls on the level."""
+        return [fmpq_poly([0])]
+
+
 def mechanism_data(parameters: Mapping[str, Any], source: str = "artifact") -> MechanismData:
     """The robot of an artifact, from its ``robot.parameters``.
 
@@ -180,9 +216,11 @@ def mechanism_data(parameters: Mapping[str, Any], source: str = "artifact") -> M
     """
     if {"active", "passive"} <= parameters.keys():
         return FiveBarData(_link(parameters["active"]), _link(parameters["passive"]))
+    if "radius_m" in parameters:
+        return DiscData(*(float(parameters[field]) for field in DiscData.__annotations__))
     links = parameters.get("links")
     if not links:
-        expected = "the links of a planar serial arm, or active and passive link of a five-bar linkage"
+        expected = "the links of a planar serial arm, active and passive link of a five-bar linkage, or a disc"
         raise InputError(source, "robot.parameters.links", links, expected)
     return SerialArmData(tuple(map(_link, links)))
 

@@ -20,7 +20,7 @@ from quasilpv.certificate.gate_data import HALF_A_SAMPLE, inertia_data, law_kind
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_range
 from quasilpv.certificate.gate_rationals import to_float
 from quasilpv.certificate.program_values import program_values
-from quasilpv.certificate.stabilisation_model import gravity_stiffness
+from quasilpv.certificate.robot_dynamics import gravity_stiffness
 from quasilpv.certificate.vertex_tables import VertexTable
 from quasilpv.loops.frozen_loop import FloatArray, FrozenLaw
 from quasilpv.loops.hinf_law import hinf_tracking_law

@@ -21,6 +21,7 @@ from flint import arb
 
 from quasilpv.certificate.claims import Claim
 from quasilpv.certificate.program_values import program_values
+from quasilpv.certificate.robot_dynamics import gravity_stiffness, robot_dynamics
 from quasilpv.certificate.vertex_tables import VertexTable
 
 FloatArray = npt.NDArray[np.float64]
@@ -109,7 +110,7 @@ def equations_of_motion_claim(document: Mapping[str, Any], E: VertexTable, A: Ve
     )
     n = theta.shape[1]
     premises = np.column_stack(program_values(document["programs"]["schedule"], list(theta.T), list(omega.T)))
-    inertia, torque, scale = arm_dynamics(document["robot"]["parameters"], theta, omega)
+    inertia, torque, scale = robot_dynamics(document["robot"]["parameters"], theta, omega)
     descriptor = np.broadcast_to(np.eye(2 * n), (STATES, 2 * n, 2 * n)).copy()
     descriptor[:, n:, n:] = inertia
     drift = np.einsum("kij,kj->ki", A.evaluate(premises), np.concatenate([theta, omega], axis=1))
@@ -121,55 +122,6 @@ def equations_of_motion_claim(document: Mapping[str, Any], E: VertexTable, A: Ve
     return Claim(title, max(errors) <= ROUNDING, max(-1.0, 1.0 - float(max(errors)) / ROUNDING))
 
 
-def arm_dynamics(
-    parameters: Mapping[str, Any], theta: FloatArray, omega: FloatArray
-) -> tuple[FloatArray, FloatArray, float]:
-    """Inertia, torque ``N omega + G``, and the size of its terms, of a planar serial arm at K states (K, n).
-
-    In absolute angles ``alpha = S theta``, W = S omega: ``M = S' [D_kl cos(alpha_k - alpha_l)] S`` and the torque is
-    ``S' (sum_l D_kl sin(alpha_k - alpha_l) W_l^2 + g_k sin(alpha_k)) + friction``.
-    """
-    links = parameters["links"]
-    n = len(links)
-    L, m, r, I, friction = (  # noqa: E741
-        np.array([float(link[field]) for link in links])
-        for field in ("length_m", "mass_kg", "com_m", "inertia_kg_m2", "friction_nm_s")
-    )
-    outer = np.array([m[k + 1 :].sum() for k in range(n)])
-    D = np.diag(I + L**2 * outer)
-    for k in range(n):
-        for j in range(k):
-            D[j, k] = D[k, j] = L[j] * (m[k] * r[k] + L[k] * outer[k])
-    sign = 1.0 if parameters["equilibrium"] == "hanging" else -1.0
-    g = sign * float(parameters["gravity_m_s2"]) * (m * r + L * outer)
-    alpha, W = np.cumsum(theta, axis=1), np.cumsum(omega, axis=1)
-    difference = alpha[:, :, None] - alpha[:, None, :]
-    S = np.tril(np.ones((n, n)))
-    inertia = S.T @ (D * np.cos(difference)) @ S
-    link_torque = np.einsum("kij,kj->ki", D * np.sin(difference), W**2) + g * np.sin(alpha)
-    scale = float(np.abs(g).sum() + np.abs(D).sum() * (1.0 + (W**2).max()) + np.abs(friction * omega).max())
-    return inertia, link_torque @ S + friction * omega, scale
-
-
-def gravity_stiffness(document: Mapping[str, Any], theta: FloatArray, payload_fraction: float) -> FloatArray:
-    """Gravity torque as ``H(theta) theta`` of the robot with a payload, at K configurations (K, n): H, (K, n, n)."""
-    parameters, payloads = document["robot"]["parameters"], document["payloads"]
-    first = []
-    for k, link in enumerate(parameters["links"]):
-        factor = {
-            name: 1.0 + payload_fraction * (float(payloads[name][k]) - 1.0) for name in ("mass_scale", "com_scale")
-        }
-        mass = float(link["mass_kg"]) * factor["mass_scale"]
-        first.append((mass, mass * float(link["com_m"]) * factor["com_scale"], float(link["length_m"])))
-    outer = [sum(mass for mass, _, _ in first[k + 1 :]) for k in range(len(first))]
-    sign = 1.0 if parameters["equilibrium"] == "hanging" else -1.0
-    g = sign * float(parameters["gravity_m_s2"])
-    constants = np.array([g * (moment + length * m) for (_, moment, length), m in zip(first, outer, strict=True)])
-    S = np.tril(np.ones((len(first), len(first))))
-    sinc = np.sinc(np.cumsum(theta, axis=1) / np.pi)
-    return np.asarray(np.einsum("ki,zk,kj->zij", S, constants * sinc, S))
-
-
 def linearisation_claim(document: Mapping[str, Any], E: VertexTable, A: VertexTable) -> Claim:
     """The claim that A is the robot's at rest, ``[0, I; -H(0), -N(0, 0)]``, and ``E(z) = diag(I, M)`` is sampled.
 
@@ -178,14 +130,14 @@ def linearisation_claim(document: Mapping[str, Any], E: VertexTable, A: VertexTa
     n = int(document["joints"])
     parameters = document["robot"]["parameters"]
     zero, step = np.zeros((n, n)), 1e-6 * np.eye(n)
-    _, above, scale = arm_dynamics(parameters, step, zero)
-    _, below, _ = arm_dynamics(parameters, -step, zero)
-    _, friction, _ = arm_dynamics(parameters, zero, step)
+    _, above, scale = robot_dynamics(parameters, step, zero)
+    _, below, _ = robot_dynamics(parameters, -step, zero)
+    _, friction, _ = robot_dynamics(parameters, zero, step)
     expected = np.block([[zero, np.eye(n)], [-(above - below).T / 2e-6, -friction.T / 1e-6]])
     rng = np.random.default_rng(_SEED)
     theta = np.column_stack([rng.uniform(low, high, STATES) for low, high in document["domain"]["angle_rad"]])
     premises = np.column_stack(program_values(document["programs"]["schedule"], list(theta.T), list(0.0 * theta.T)))
-    inertia, _, _ = arm_dynamics(parameters, theta, 0.0 * theta)
+    inertia, _, _ = robot_dynamics(parameters, theta, 0.0 * theta)
     found = E.evaluate(premises)
     errors = (
         np.abs(A.evaluate(premises) - expected).max() / scale,
@@ -194,3 +146,13 @@ def linearisation_claim(document: Mapping[str, Any], E: VertexTable, A: VertexTa
     )
     title = f"design model: the robot's inertia at {STATES} states (sampled), linearised at rest otherwise"
     return Claim(title, max(errors) <= ROUNDING, max(-1.0, 1.0 - float(max(errors)) / ROUNDING))
+
+
+def payload_claim(document: Mapping[str, Any]) -> Claim:
+    """The claim that a payload changes the robot's inertia only: its gravity torque (or spring) is the nominal one."""
+    low, high = np.array(document["domain"]["angle_rad"], dtype=float).T
+    angles = np.linspace(low, high, STATES)
+    nominal, *others = (gravity_stiffness(document, angles, fraction) for fraction in (0.0, 0.5, 1.0))
+    error = max(float(np.abs(other - nominal).max()) for other in others) / max(1.0, float(np.abs(nominal).max()))
+    title = f"design model: a payload changes the inertia only, at {STATES} postures (sampled)"
+    return Claim(title, error <= ROUNDING, max(-1.0, 1.0 - error / ROUNDING))

@@ -10,6 +10,10 @@ With the vertices E_i, A_i of the witness's model over the premises of ``schedul
 
   (the closed loop E x' = (A + B K) x in the redundant state (x, x'); Dehak 2022, Theorem I.2). Linear in the vertices
   because B is constant.
+  With the condition III.9, whose claim is about every payload (Dehak 2022, Theorem III.9: what the payload changes is
+  unknown to the law), ``He((A_i + B K_i) P E_f') + 2 alpha E_f P E_f' < 0`` for every vertex i and for the robot's own
+  descriptor ``E_f = diag(I, M_f)`` at payload fractions f = 0 and 1. M has no premise and is affine in f, and the left
+  side is convex in E, so it holds between.
 * `descriptor-feedback`, V = x' P^-1 x: ``He(Phi_i) + T_b(i) - mean < 0`` for every vertex i,
 
       Phi_i = [(A_i + alpha E_i) L + B F_i, (A_i + alpha E_i) R; P E_i' - L, -R]
@@ -39,9 +43,12 @@ from flint import fmpq, fmpq_mat
 from quasilpv.certificate.claims import Claim
 from quasilpv.certificate.double_sum import he
 from quasilpv.certificate.exact_matrices import identity, is_symmetric, matrix, rational, stack, zero
+from quasilpv.certificate.gate_data import inertia_data
+from quasilpv.certificate.gate_inertia import true_inertia
 from quasilpv.certificate.stabilisation_model import (
     equations_of_motion_claim,
     linearisation_claim,
+    payload_claim,
     premise_box_claims,
 )
 from quasilpv.certificate.vertex_tables import VertexTable
@@ -80,6 +87,8 @@ def check_state_feedback(document: Mapping[str, Any]) -> tuple[Claim, ...]:
     """
     table = VertexTable.parse(document["law"]["gain"])
     model = _Model.of(document, table)
+    if model.witness["condition"] == "III.9":
+        return _robust_claims(document, model, table)
     P, lower_left, lower_right = (matrix(model.witness[name]) for name in ("P", "P21", "P22"))
     size = P.nrows()
     none = zero(size, size)
@@ -95,6 +104,31 @@ def check_state_feedback(document: Mapping[str, Any]) -> tuple[Claim, ...]:
         *_single_sum(model, phi, table.vertices()),
         *premise_box_claims(document, table),
         equations_of_motion_claim(document, model.E, model.A),
+        *table.collapse_claim("gain"),
+    )
+
+
+def _robust_claims(document: Mapping[str, Any], model: _Model, table: VertexTable) -> tuple[Claim, ...]:
+    """The claims of condition III.9 about a `state-feedback` law."""
+    P = matrix(model.witness["P"])
+    inertia = true_inertia(inertia_data(document))
+    n = len(inertia)
+    if n > 1 or inertia[0][0].degree() > 1:
+        raise ValueError("the inertia is affine in the payload and has no premise")
+    descriptors = [stack([[identity(n), zero(n, n)], [zero(n, n), matrix([[inertia[0][0](fmpq(f))]])]]) for f in (0, 1)]
+    closed = [A + model.B * K for A, K in zip(model.A.vertices(), table.vertices(), strict=True)]
+    decrease = (
+        Claim.positive(f"feedback: decrease {i}, payload {f}", -he(loop * P * E) - 2 * model.decay * E * P * E)
+        for i, loop in enumerate(closed)
+        for f, E in enumerate(descriptors)
+    )
+    return (
+        Claim.positive("feedback: decay rate", matrix([[model.decay]])),
+        Claim.positive("feedback: P", P),
+        *decrease,
+        *premise_box_claims(document, table),
+        equations_of_motion_claim(document, model.E, model.A),
+        payload_claim(document),
         *table.collapse_claim("gain"),
     )
 

@@ -36,7 +36,8 @@ class TrackingExperiment:
         robot: from the registry.
         trajectory: the reference.
         external_torque: sines on the joints.
-        initial_angle_rad: angles of the plant at t = 0, at rest; None to start on the reference.
+        initial_angle_rad: angles of the plant at t = 0; None to start on the reference.
+        initial_speed_rad_s: its speeds then; None for rest.
     """
 
     name: str
@@ -44,6 +45,7 @@ class TrackingExperiment:
     trajectory: Trajectory
     external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE
     initial_angle_rad: tuple[float, ...] | None = None
+    initial_speed_rad_s: tuple[float, ...] | None = None
 
     @classmethod
     def registered(cls, scenario_id: str) -> TrackingExperiment:
@@ -55,7 +57,9 @@ class TrackingExperiment:
         task = tracking_task(scenario_id)
         task_robot = robot(task.robot)
         trajectory = task.trajectory(task_robot.model, task_robot.domain)
-        return cls(task.id, task_robot, trajectory, task.external_torque, task.initial_angle_rad)
+        return cls(
+            task.id, task_robot, trajectory, task.external_torque, task.initial_angle_rad, task.initial_speed_rad_s
+        )
 
     @classmethod
     def from_path_file(cls, path: Path | str, robot_id: str) -> TrackingExperiment:
@@ -110,6 +114,7 @@ def write_run_files(
         external_torque=experiment.external_torque,
         transport_delay_s=transport_delay_s,
         initial_angle_rad=experiment.initial_angle_rad,
+        initial_speed_rad_s=experiment.initial_speed_rad_s,
     )
     return RunFiles(
         artifact=write_artifact(folder, artifact)[0],

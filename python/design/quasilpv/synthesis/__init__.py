@@ -60,6 +60,10 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
         stabilisation.descriptor,
         rate_hz=4000.0,
     ),
+    "robust": ControllerKind(
+        "stabilises theta = 0 with unknown inertia: feedback of least gain (Dehak 2022, Theorem III.9), speeds too",
+        stabilisation.robust,
+    ),
     "delayed": ControllerKind(
         "stabilises theta = 0: descriptor law with a moving window (Dehak 2022, Theorem II.8), measured speeds",
         stabilisation.delayed,

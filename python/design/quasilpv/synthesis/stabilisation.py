@@ -1,18 +1,13 @@
-"""Laws that stabilise an arm around theta = 0: the conditions of chapters I to III with the smallest gains.
+"""Laws that stabilise a robot around theta = 0: the conditions of chapters I to III with the smallest gains.
 
-For a robot with one motor per joint, feasibility alone says nothing: B = [0; I] leaves the gains free to cancel
-everything (`conditions.matched`). What is asked for here is a decay rate and, among the laws that have it, the
-smallest gain: with ``S = diag(I, w I)`` for a rate w that weighs angles against speeds,
-
-    minimise kappa   subject to   the condition,   P > S^2,   |M_j S^-1| < kappa   for the vertices of the numerator
-
-so that ``|K S| < kappa`` for K = M P^-1 (and ``|K S| < kappa |E^-1|`` for the descriptor law). Of the rates tried the
-one of smallest gain is chosen whose frozen sampled loop is stable with every payload and delay.
+Of the gains of `stabilising_gains`, one set per rate, the smallest is chosen whose frozen sampled loop is stable with
+every payload and delay.
 
 `pdc` and `descriptor` use all premises of the robot, of angles and measured speeds: where the plant is the nominal one
-their Lyapunov function decreases over the whole operating domain. `delayed` uses the premise of the inertia alone (its
-inequalities grow with the fifth power of the number of vertices) and takes gravity and Coriolis torque as they are at
-rest; what they are beyond that is a disturbance to it.
+their Lyapunov function decreases over the whole operating domain. `robust` knows the same premises, and its function
+decreases with every payload. `delayed` uses the premise of the inertia alone (its inequalities grow with the fifth
+power of the number of vertices) and takes gravity and Coriolis torque as they are at rest; what they are beyond that is
+a disturbance to it.
 """
 
 from __future__ import annotations
@@ -24,16 +19,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from quasilpv.conditions import i2, ii6
-from quasilpv.conditions.condition import Form, Options, Statement, Values
-from quasilpv.conditions.ii8_direct import delayed_design
 from quasilpv.errors import InfeasibleError
-from quasilpv.lmi import Problem, Variable, block
 from quasilpv.loops.loop_grid import PAYLOAD_FRACTIONS, LoopGrid, configurations
-from quasilpv.loops.state_law import StateLaw, descriptor_gain
+from quasilpv.loops.state_law import StateLaw
 from quasilpv.polytopes import BlockPolytope, PolytopicModel
 from quasilpv.synthesis.acceleration_design import Progress
+from quasilpv.synthesis.robust_feedback import robust_solver
 from quasilpv.synthesis.specification import Specification
+from quasilpv.synthesis.stabilising_gains import (
+    WINDOW_S,
+    Candidate,
+    Solver,
+    solve_delayed,
+    solve_descriptor,
+    solve_pdc,
+)
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.premise import AffineMatrix
@@ -47,34 +47,8 @@ DECAY_PER_S = 1.0
 RATES = (4.0, 8.0)
 """Weights w of the gain limit, 1/s."""
 
-WINDOW_S = 0.05
-"""Moving window of `delayed`."""
-
 FILTER_SAMPLES = 2.0
 """Time constant of the speed filter, in samples."""
-
-BACK_OFF = 0.1
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """One solution: the fields of the law, what its checker needs, its gain, and the law frozen at a configuration.
-
-    Attributes:
-        law: fields of the law kind.
-        witness: matrices by name.
-        gain_limit: kappa.
-        gain: from weights of the vertices (count,) and the design inertia (n, n) to K (n, 2n).
-    """
-
-    law: Mapping[str, Any]
-    witness: Mapping[str, Any]
-    gain_limit: float
-    gain: Callable[[FloatArray, FloatArray], FloatArray]
-
-
-Solver = Callable[[PolytopicModel, float, float], Candidate | None]
-"""From the model, the decay rate and the rate w to a candidate; None if there is no verified solution."""
 
 
 def full_model(robot: Robot) -> PolytopicModel:
@@ -114,121 +88,20 @@ def _per_premise(system: DescriptorSystem) -> PolytopicModel:
     return PolytopicModel(system, BlockPolytope.per_premise(system.lower, system.upper))
 
 
-def _named(problem: Problem, name: str) -> Variable:
-    return next(variable for variable in problem.variables if variable.name == name)
-
-
-def _with_gain_limit(problem: Problem, gains: Sequence[Variable], lyapunov: Sequence[Any], rate: float) -> None:
-    """Add the gain limit of the module's description and minimise it."""
-    kappa, (inputs, size) = Variable("gain limit", 1), (gains[0].rows, gains[0].cols)
-    scale = np.repeat([1.0, rate], size // 2)
-    for k, P in enumerate(lyapunov):
-        problem.positive(f"gain limit: P {k}", P - np.diag(scale**2))
-    for j, gain in enumerate(gains):
-        scaled = (gain @ np.diag(1.0 / scale)).T
-        problem.positive(f"gain limit {j}", block([[kappa * np.eye(inputs), None], [scaled, kappa * np.eye(size)]]))
-    problem.minimise(kappa)
-
-
-def solve_pdc(model: PolytopicModel, decay: float, rate: float) -> Candidate | None:
-    """Theorem I.2 as a single sum with one slack matrix per block; K_j = M_j P_11^-1."""
-    statement = i2.with_gains(model, Options(decay_rate=decay), single=True)
-    problem = statement.problem
-    P11 = _named(problem, "P11")
-    M = [_named(problem, f"M{j}") for j in range(model.vertex_count)]
-    _with_gain_limit(problem, M, [P11], rate)
-    solution = problem.solve_inside(BACK_OFF)
-    if not solution.verified:
-        return None
-    values = solution.values
-    P = _symmetric(values[P11])
-    gains = np.linalg.solve(P, np.stack([values[Mj] for Mj in M]).swapaxes(1, 2)).swapaxes(1, 2)
-    witness = {"P": P, "P21": values[_named(problem, "P21")], "P22": values[_named(problem, "P22")]}
-    return Candidate(
-        law={"kind": "state-feedback", "gain": model.polytope.to_document(gains)},
-        witness=_lists(witness) | {"slack": _slack(statement, values)},
-        gain_limit=solution.objective,
-        gain=lambda weights, inertia: np.asarray(np.tensordot(weights, gains, axes=1)),
-    )
-
-
-def solve_descriptor(model: PolytopicModel, decay: float, rate: float) -> Candidate | None:
-    """Theorem II.6 with common L and R, a single sum with one slack matrix per block."""
-    statement = ii6.build(model, Options(decay_rate=decay, common=True, form=Form.PUBLISHED))
-    problem = statement.problem
-    unknown = _named(problem, "P")
-    F = [_named(problem, f"F{j}") for j in range(model.vertex_count)]
-    _with_gain_limit(problem, F, [unknown], rate)
-    solution = problem.solve_inside(BACK_OFF)
-    if not solution.verified:
-        return None
-    values = solution.values
-    P, numerators = _symmetric(values[unknown]), np.stack([values[Fj] for Fj in F])
-    return Candidate(
-        law={
-            "kind": "descriptor-feedback",
-            "numerator": model.polytope.to_document(numerators),
-            "lyapunov": P.tolist(),
-        },
-        witness=_lists({"L": values[_named(problem, "L")], "R": values[_named(problem, "R")]})
-        | {"slack": _slack(statement, values)},
-        gain_limit=solution.objective,
-        gain=lambda weights, inertia: descriptor_gain(np.tensordot(weights, numerators, axes=1), inertia, P),
-    )
-
-
-def solve_delayed(model: PolytopicModel, decay: float, rate: float) -> Candidate | None:
-    """Theorem II.8 without multipliers, window `WINDOW_S`."""
-    design = delayed_design(model, decay, WINDOW_S)
-    vertices = range(model.vertex_count)
-    F = list(design.F.values())
-    _with_gain_limit(design.problem, F, [design.lyapunov.at(k) for k in vertices], rate)
-    solution = design.problem.solve_inside(BACK_OFF)
-    if not solution.verified:
-        return None
-    P = np.stack([_symmetric(design.lyapunov.at(k).at(solution.values).astype(float)) for k in vertices])
-    numerators = np.stack([solution.values[Fj] for Fj in F])
-    cube = numerators.reshape(*(len(P),) * 3, *numerators.shape[1:])
-
-    def gain(weights: FloatArray, inertia: FloatArray) -> FloatArray:
-        numerator = np.einsum("j,k,m,jkmab->ab", weights, weights, weights, cube)
-        return descriptor_gain(numerator, inertia, np.tensordot(weights, P, axes=1))
-
-    law = {
-        "kind": "delayed-feedback",
-        "lyapunov": model.polytope.to_document(P),
-        "numerators": numerators.tolist(),
-        "descriptor": True,
-    }
-    return Candidate(law, {"window_s": WINDOW_S}, solution.objective, gain)
-
-
-def _slack(statement: Statement, values: Values) -> list[Any]:
-    """The slack of ``He(X) + T``; the inequalities are stated as ``X + T`` with the symmetric part of X."""
-    return [(values[T] + values[T].T).tolist() for T in statement.slacks]
-
-
-def _symmetric(square: FloatArray) -> FloatArray:
-    return np.asarray((square + square.T) / 2.0)
-
-
-def _lists(matrices: Mapping[str, FloatArray]) -> dict[str, Any]:
-    return {name: matrix.tolist() for name, matrix in matrices.items()}
-
-
 @dataclass(frozen=True)
 class _Kind:
-    """A stabilising controller: its condition, its model and who solves it."""
+    """A stabilising controller: its condition, the model its claim is about, and who solves it for a robot."""
 
     condition: str
     model: Callable[[Robot], PolytopicModel]
-    solve: Solver
+    solver: Callable[[Robot], Solver]
 
 
 _KINDS: Mapping[str, _Kind] = {
-    "pdc": _Kind("I.2", full_model, solve_pdc),
-    "descriptor": _Kind("II.6", full_model, solve_descriptor),
-    "delayed": _Kind("II.8-direct", inertia_model, solve_delayed),
+    "pdc": _Kind("I.2", full_model, lambda _: solve_pdc),
+    "descriptor": _Kind("II.6", full_model, lambda _: solve_descriptor),
+    "robust": _Kind("III.9", full_model, robust_solver),
+    "delayed": _Kind("II.8-direct", inertia_model, lambda _: solve_delayed),
 }
 
 
@@ -240,6 +113,11 @@ def pdc(robot: Robot, specification: Specification, progress: Progress) -> Track
 def descriptor(robot: Robot, specification: Specification, progress: Progress) -> TrackingDesign:
     """Design `descriptor`; see `stabilisation`."""
     return stabilisation(robot, "descriptor", specification, progress)
+
+
+def robust(robot: Robot, specification: Specification, progress: Progress) -> TrackingDesign:
+    """Design `robust`; see `stabilisation`."""
+    return stabilisation(robot, "robust", specification, progress)
 
 
 def delayed(robot: Robot, specification: Specification, progress: Progress) -> TrackingDesign:
@@ -260,7 +138,7 @@ def stabilisation(
 
     Args:
         robot: its operating domain contains theta = 0.
-        controller: ``pdc``, ``descriptor`` or ``delayed``.
+        controller: ``pdc``, ``descriptor``, ``robust`` or ``delayed``.
         specification: sample rate, and the delay its frozen loop has to tolerate.
         progress: called with (rates done, rates in all).
         decay_per_s: alpha > 0, of the state.
@@ -273,10 +151,10 @@ def stabilisation(
     if any(not low < 0.0 < high for low, high in robot.domain.angle_rad):
         raise InfeasibleError(f"{robot.id}: no {controller} design: its operating domain does not contain theta = 0")
     kind = _KINDS[controller]
-    model = kind.model(robot)
+    model, solve = kind.model(robot), kind.solver(robot)
     found = []
     for done, rate in enumerate(rates, start=1):
-        candidate = kind.solve(model, decay_per_s, rate)
+        candidate = solve(model, decay_per_s, rate)
         if candidate is not None:
             found.append((candidate.gain_limit, rate, candidate))
         progress(done, len(rates))

@@ -12,6 +12,7 @@ from quasilpv.systems.arms import PlanarSerialArm
 from quasilpv.systems.fivebar import RhombicFiveBar
 from quasilpv.systems.fivebar_linkage import FiveBarLinkage
 from quasilpv.systems.mechanism import PlanarMechanism
+from quasilpv.systems.rolling_disc import InertiaSet, RollingDisc
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Robot:
 
 def robots() -> tuple[Robot, ...]:
     """All robots, in a fixed order."""
-    return (_arm2(), _arm3(), _arm2_upright(), _arm3_light(), _fivebar())
+    return (_arm2(), _arm3(), _arm2_upright(), _arm3_light(), _fivebar(), _spring_disc())
 
 
 def robot(name: str) -> Robot:
@@ -89,6 +90,19 @@ def fivebar() -> FiveBarLinkage:
     active = Link(length_m=0.165, mass_kg=0.0825, com_m=0.0825, inertia_kg_m2=0.0011)
     passive = Link(length_m=0.165, mass_kg=0.0825, com_m=0.0825, inertia_kg_m2=0.0007)
     return FiveBarLinkage("fivebar", active, passive)
+
+
+def spring_disc() -> RollingDisc:
+    """The disc of Dehak 2022, Example III.12, with the mass of fig. III.4."""
+    return RollingDisc(
+        "spring-disc",
+        mass_kg=0.1,
+        radius_m=2.0,
+        inertia_kg_m2=4.0,
+        stiffness_n_m=1.0,
+        cubic_stiffness_n_m3=1.0,
+        damping_n_s_m=2.0,
+    )
 
 
 @lru_cache(maxsize=1)
@@ -176,4 +190,21 @@ def _fivebar() -> Robot:
         payloads=PayloadSet(mass_scale=(1.4, 2.2), com_scale=(1.0, 1.0)),
         disturbance_frequency_rad_s=50.0,
         printed_bandwidth_rad_s=80.0 * pi,
+    )
+
+
+@lru_cache(maxsize=1)
+def _spring_disc() -> Robot:
+    """``|x_1| <= 5`` of the source is 2.5 rad; the domain leaves 0.1 rad around it, where fig. III.4 starts.
+
+    The uncertainty is 0 <= delta <= 3: moments of inertia from 4 down to 1 kg m^2. Limits and the bound on speeds are
+    choices of this project.
+    """
+    return Robot(
+        id="spring-disc",
+        summary="rolling disc on a hardening spring, uncertain inertia, 1 joint (Dehak 2022, Example III.12)",
+        model=spring_disc(),
+        domain=OperatingDomain.symmetric(1, angle_rad=2.6, speed_rad_s=12.0),
+        limits=ActuatorLimits(torque_nm=(200.0,), slew_nm_per_s=(1e6,)),
+        payloads=InertiaSet(mass_scale=(0.25,), com_scale=()),
     )
