@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import io
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -13,10 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from quasilpv.artifact import Artifact
+from quasilpv.artifact import read_artifact
 from quasilpv.certificate import verify
 from quasilpv.errors import InputError
-from quasilpv.experiments.result import TrackResult
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.trajectories import plan
 
@@ -96,39 +98,33 @@ def test_a_domain_around_a_motion_is_its_box_widened() -> None:
 
 
 @pytest.fixture(scope="module")
-def artifact() -> Artifact:
-    made = example.designed(example.robot())
-    assert isinstance(made, Artifact)
-    return made
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+    """What the example writes, and the lines it prints."""
+    folder = tmp_path_factory.mktemp("four-link-arm")
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        example.main(folder)
+    return folder, printed.getvalue().splitlines()
 
 
-@pytest.fixture(scope="module")
-def result(artifact: Artifact, tmp_path_factory: pytest.TempPathFactory) -> TrackResult:
-    made = example.tracked(example.robot(), artifact, tmp_path_factory.mktemp("seam"))
-    assert isinstance(made, TrackResult)
-    return made
-
-
-def test_the_controller_is_proved_for_every_posture_and_payload(artifact: Artifact) -> None:
+def test_the_controller_is_proved_for_every_posture_and_payload(run: tuple[Path, list[str]]) -> None:
+    artifact = read_artifact(run[0] / "with" / "artifact.json")
     gate = (artifact.verification or {})["gate"]
     assert (gate["passed"], gate["proved"]) == (True, True)
     assert verify(artifact.content(), artifact.name).verified
 
 
-def test_the_loaded_arm_follows_the_seam_under_disturbance(result: TrackResult) -> None:
+def test_the_loaded_arm_follows_the_seam_within_its_limits(run: tuple[Path, list[str]], tmp_path: Path) -> None:
+    result = example.tracked(example.robot(), read_artifact(run[0] / "with" / "artifact.json"), tmp_path)
     assert np.all(result.run.flags == 0)
     assert max(result.metrics.rms_x_m, result.metrics.rms_y_m) <= LARGEST_RMS_M
-    limits = np.array(example.robot().limits.torque_nm)
-    assert np.all(np.abs(result.run.torque_nm).max(axis=0) < limits)
+    assert np.all(np.abs(result.run.torque_nm).max(axis=0) < example.robot().limits.torque_nm)
 
 
-def test_when_the_example_is_run_expect_its_figures_and_an_accuracy_that_compensation_improves_tenfold(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    example.main(tmp_path)
-    without, compensated = (
-        [float(word) for word in line.replace(" um", "").split() if word[0].isdigit()]
-        for line in capsys.readouterr().out.splitlines()
-    )
+def test_compensation_improves_the_printed_accuracy_tenfold(run: tuple[Path, list[str]]) -> None:
+    without, compensated = ([float(number) for number in re.findall(r"([\d.]+) um", line)] for line in run[1])
+    assert len(without) == 2
     assert all(a > 10 * b for a, b in zip(without, compensated, strict=True))
-    assert {"path.png", "errors.png", "animation.gif"} <= {path.name for path in tmp_path.iterdir()}
+
+
+def test_figures_and_animation_are_written(run: tuple[Path, list[str]]) -> None:
+    assert {"path.png", "errors.png", "animation.gif"} <= {path.name for path in run[0].iterdir()}
