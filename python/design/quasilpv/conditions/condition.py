@@ -11,9 +11,10 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.conditions.blocks import double_sum, single_sum
 from quasilpv.conditions.slack import Slack
 from quasilpv.errors import InputError
-from quasilpv.lmi import Problem, Variable
+from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.polytopes import PolytopicModel
 
 FloatArray = npt.NDArray[np.float64]
@@ -193,6 +194,55 @@ def is_single_sum(model: PolytopicModel, slack: Slack) -> bool:
 def single_sum_blocks(model: PolytopicModel, slack: Slack) -> npt.NDArray[np.intp] | None:
     """Blocks of the vertices for the slack of a single sum, in which all families are the same; None for none."""
     return None if slack is Slack.NONE else model.polytope.block_index
+
+
+def vertex_sum(
+    problem: Problem,
+    name: str,
+    entry: Callable[[int, int], Expression],
+    model: PolytopicModel,
+    slack: Slack,
+    *,
+    single: bool = False,
+) -> tuple[Variable, ...]:
+    """Require ``sum_ij w_i w_j X_ij < 0`` over the vertices of a model; see `double_sum` and `single_sum`.
+
+    Args:
+        problem, name, entry: as in `double_sum`.
+        model: the system.
+        slack: which family.
+        single: write it as a single sum over X_ii; only if it is one, see `is_single_sum`.
+
+    Returns:
+        The slack matrices.
+    """
+    if single:
+        blocks = single_sum_blocks(model, slack)
+        return single_sum(problem, name, lambda i: entry(i, i), model.vertex_count, blocks)
+    return double_sum(problem, name, entry, model.vertex_count, model.polytope.block_index, slack=slack)
+
+
+def descriptor_statement(
+    model: PolytopicModel,
+    options: Options,
+    entry: Callable[[Variable, Sequence[Variable]], Callable[[int, int], Expression]],
+    *,
+    single: bool = False,
+) -> Statement:
+    """A double sum in ``P = P' > 0`` (n, n) and F_j (m, n) per vertex, solved by the law ``F(z) E(z)^-T P^-1 x``.
+
+    Args:
+        model: a regular system.
+        options: of the statement.
+        entry: from P and the F_j to X_ij, which may have further unknowns.
+        single: as in `vertex_sum`.
+    """
+    P = Variable("P", model.order, symmetric=True)
+    F = shared_gains(model, model.order)
+    problem = Problem()
+    problem.positive("P", P)
+    slacks = vertex_sum(problem, "Xi", entry(P, F), model, options.slack, single=single)
+    return Statement(problem, descriptor_feedback(model, P, F), slacks)
 
 
 def descriptor_feedback(model: PolytopicModel, P: Variable, F: Sequence[Variable]) -> Callable[[Values], Feedback]:

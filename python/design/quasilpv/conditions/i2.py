@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from quasilpv.conditions.blocks import double_sum, single_sum
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
@@ -33,7 +32,7 @@ from quasilpv.conditions.condition import (
     on_state,
     polytopic_gain,
     shared_gains,
-    single_sum_blocks,
+    vertex_sum,
 )
 from quasilpv.conditions.cube import cube_with_gains, is_cube
 from quasilpv.conditions.elimination import algebraic_part, gains_are_free, gains_on_differential, unactuated_rows
@@ -84,7 +83,7 @@ def with_gains(model: PolytopicModel, options: Options, *, single: bool) -> Stat
         model, options: of the statement.
         single: write the double sum as a single one, see `is_single_sum`.
     """
-    q, n, count = model.differential, model.order, model.vertex_count
+    q, n = model.differential, model.order
     P = _Lyapunov(model)
     M = shared_gains(model, q, "M")
     A, B = extended_states(model, options.decay_rate), extended_inputs(model)
@@ -94,10 +93,7 @@ def with_gains(model: PolytopicModel, options: Options, *, single: bool) -> Stat
     def entry(i: int, j: int) -> Expression:
         return as_expression(A[i] @ P.matrix + B[i] @ on_differential(M[j], q, n))
 
-    if single:
-        slacks = single_sum(problem, "Upsilon", lambda i: entry(i, i), count, single_sum_blocks(model, options.slack))
-    else:
-        slacks = double_sum(problem, "Upsilon", entry, count, model.polytope.block_index, slack=options.slack)
+    slacks = vertex_sum(problem, "Upsilon", entry, model, options.slack, single=single)
 
     def feedback(values: Values) -> Feedback:
         gain = polytopic_gain(model, M, values, on_state(values[P.P11], n))

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from quasilpv.conditions.blocks import double_sum, single_sum
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
@@ -23,7 +22,7 @@ from quasilpv.conditions.condition import (
     is_single_sum,
     polytopic_gain,
     shared_gains,
-    single_sum_blocks,
+    vertex_sum,
 )
 from quasilpv.conditions.elimination import completed, gains_are_free, gains_on_extended, unactuated_rows
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, extended_states_in_double
@@ -38,7 +37,7 @@ def build(model: PolytopicModel, options: Options) -> Statement:
 
     Unknowns ``P_11 = P_11' > 0`` (q, q), P_21 (n, q), P_22 (n, n) and M_j (m, N) per vertex.
     """
-    q, n, count = model.differential, model.order, model.vertex_count
+    q, n = model.differential, model.order
     P11, P21, P22 = Variable("P11", q, symmetric=True), Variable("P21", n, q), Variable("P22", n)
     P = extended_lyapunov(P11, P21, P22)
     problem = Problem()
@@ -54,11 +53,8 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     def entry(i: int, j: int) -> Expression:
         return as_expression(A[i] @ P + B[i] @ M[j])
 
-    if is_single_sum(model, options.slack):
-        blocks = single_sum_blocks(model, options.slack)
-        slacks = single_sum(problem, "Upsilon", lambda i: entry(i, i), count, blocks)
-    else:
-        slacks = double_sum(problem, "Upsilon", entry, count, model.polytope.block_index, slack=options.slack)
+    single = is_single_sum(model, options.slack)
+    slacks = vertex_sum(problem, "Upsilon", entry, model, options.slack, single=single)
 
     def feedback(values: Values) -> Feedback:
         value = P.at(values).astype(float)

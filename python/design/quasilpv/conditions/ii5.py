@@ -27,7 +27,7 @@ from dataclasses import replace
 import numpy as np
 
 from quasilpv.conditions import i2
-from quasilpv.conditions.blocks import double_sum, require_affordable, single_sum
+from quasilpv.conditions.blocks import require_affordable
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
@@ -39,7 +39,7 @@ from quasilpv.conditions.condition import (
     on_state,
     polytopic_gain,
     shared_gains,
-    single_sum_blocks,
+    vertex_sum,
 )
 from quasilpv.conditions.cube import cube_with_gains, is_cube
 from quasilpv.conditions.elimination import gains_are_free
@@ -98,12 +98,7 @@ def with_multipliers(
         L, R = LR[j]
         return block([[A[i] @ L + B[i] @ on_differential(F[j], q, n), A[i] @ R], [P(i, j) - L, -R]])
 
-    blocks = model.polytope.block_index
-    if single:
-        own = single_sum_blocks(model, options.slack)
-        slacks = single_sum(problem, "Xi", lambda i: entry(i, i), count, own)
-    else:
-        slacks = double_sum(problem, "Xi", entry, count, blocks, slack=options.slack)
+    slacks = vertex_sum(problem, "Xi", entry, model, options.slack, single=single)
 
     def feedback(values: Values) -> Feedback:
         lyapunov = V.at(values).astype(float)

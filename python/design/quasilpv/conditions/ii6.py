@@ -13,22 +13,20 @@ Reduced form: the closed form of `matched` for systems like robots, whose premis
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 from quasilpv.conditions import matched
-from quasilpv.conditions.blocks import double_sum, single_sum
 from quasilpv.conditions.condition import (
     Condition,
     Form,
     Options,
     Statement,
-    descriptor_feedback,
+    descriptor_statement,
     is_single_sum,
     require_regular,
-    shared_gains,
-    single_sum_blocks,
 )
-from quasilpv.lmi import Expression, Problem, Variable, block
+from quasilpv.lmi import Expression, Variable, block
 from quasilpv.polytopes import PolytopicModel
 
 
@@ -44,26 +42,19 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     if options.form is Form.REDUCED and matched.applies(model):
         return matched.build(model, options)
     n, count = model.order, model.vertex_count
-    P = Variable("P", n, symmetric=True)
     labels = [""] * count if options.common else [str(j) for j in range(count)]
     unknowns = {label: (Variable(f"L{label}", n), Variable(f"R{label}", n)) for label in labels}
-    F = shared_gains(model, n)
     alpha = Fraction(options.decay_rate)
 
-    def entry(i: int, j: int) -> Expression:
-        A = model.A[i] + model.E[i] * alpha
-        L, R = unknowns[labels[j]]
-        return block([[A @ L + model.B[i] @ F[j], A @ R], [P @ model.E[i].T - L, -R]])
+    def entries(P: Variable, F: Sequence[Variable]) -> Callable[[int, int], Expression]:
+        def entry(i: int, j: int) -> Expression:
+            A = model.A[i] + model.E[i] * alpha
+            L, R = unknowns[labels[j]]
+            return block([[A @ L + model.B[i] @ F[j], A @ R], [P @ model.E[i].T - L, -R]])
 
-    problem = Problem()
-    problem.positive("P", P)
-    if options.common and is_single_sum(model, options.slack):
-        blocks = single_sum_blocks(model, options.slack)
-        slacks = single_sum(problem, "Xi", lambda i: entry(i, i), count, blocks)
-    else:
-        slacks = double_sum(problem, "Xi", entry, count, model.polytope.block_index, slack=options.slack)
+        return entry
 
-    return Statement(problem, descriptor_feedback(model, P, F), slacks)
+    return descriptor_statement(model, options, entries, single=options.common and is_single_sum(model, options.slack))
 
 
 CONDITION = Condition(

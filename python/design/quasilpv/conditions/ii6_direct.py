@@ -10,20 +10,19 @@ Fewer unknowns and rows than Theorem II.6, which is a little less conservative. 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 from quasilpv.conditions import matched
-from quasilpv.conditions.blocks import double_sum
 from quasilpv.conditions.condition import (
     Condition,
     Form,
     Options,
     Statement,
-    descriptor_feedback,
+    descriptor_statement,
     require_regular,
-    shared_gains,
 )
-from quasilpv.lmi import Expression, Problem, Variable
+from quasilpv.lmi import Expression, Variable
 from quasilpv.lmi.expressions import as_expression
 from quasilpv.polytopes import PolytopicModel
 
@@ -39,19 +38,16 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     require_regular(model, "II.6-direct")
     if options.form is Form.REDUCED and matched.applies(model):
         return matched.build(model, options)
-    n, count = model.order, model.vertex_count
-    P = Variable("P", n, symmetric=True)
-    F = shared_gains(model, n)
     alpha = Fraction(options.decay_rate)
 
-    def entry(i: int, j: int) -> Expression:
-        drift = (model.A[i] + model.E[i] * alpha) @ P @ model.E[j].T
-        return as_expression(drift + model.B[i] @ F[j])
+    def entries(P: Variable, F: Sequence[Variable]) -> Callable[[int, int], Expression]:
+        def entry(i: int, j: int) -> Expression:
+            drift = (model.A[i] + model.E[i] * alpha) @ P @ model.E[j].T
+            return as_expression(drift + model.B[i] @ F[j])
 
-    problem = Problem()
-    problem.positive("P", P)
-    slacks = double_sum(problem, "Xi", entry, count, model.polytope.block_index, slack=options.slack)
-    return Statement(problem, descriptor_feedback(model, P, F), slacks)
+        return entry
+
+    return descriptor_statement(model, options, entries)
 
 
 CONDITION = Condition(

@@ -19,19 +19,18 @@ about ``alpha h``, so that a small enough h is always covered; whether a given h
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from math import exp
 
-from quasilpv.conditions.blocks import double_sum
 from quasilpv.conditions.condition import (
     Condition,
     Options,
     Statement,
-    descriptor_feedback,
+    descriptor_statement,
     require_regular,
-    shared_gains,
 )
-from quasilpv.lmi import Expression, Problem, Variable, block, he
+from quasilpv.lmi import Expression, Variable, block, he
 from quasilpv.polytopes import PolytopicModel
 
 
@@ -44,21 +43,18 @@ def build(model: PolytopicModel, options: Options) -> Statement:
         InputError: the system has algebraic states.
     """
     require_regular(model, "sampled-feedback")
-    n, count = model.order, model.vertex_count
     h = Fraction(options.sample_period_s)
     rate = (1 - Fraction(exp(-2.0 * options.decay_rate * options.sample_period_s))) / h
-    P = Variable("P", n, symmetric=True)
-    F = shared_gains(model, n)
 
-    def entry(i: int, j: int) -> Expression:
-        Y = model.A[i] @ P @ model.E[j].T + model.B[i] @ F[j]
-        image = model.E[i] @ P @ model.E[j].T
-        return block([[he(Y) + image * rate, -Y], [-Y.T, image * (-1 / h)]])
+    def entries(P: Variable, F: Sequence[Variable]) -> Callable[[int, int], Expression]:
+        def entry(i: int, j: int) -> Expression:
+            Y = model.A[i] @ P @ model.E[j].T + model.B[i] @ F[j]
+            image = model.E[i] @ P @ model.E[j].T
+            return block([[he(Y) + image * rate, -Y], [-Y.T, image * (-1 / h)]])
 
-    problem = Problem()
-    problem.positive("P", P)
-    slacks = double_sum(problem, "Xi", entry, count, model.polytope.block_index, slack=options.slack)
-    return Statement(problem, descriptor_feedback(model, P, F), slacks)
+        return entry
+
+    return descriptor_statement(model, options, entries)
 
 
 CONDITION = Condition(
