@@ -1,6 +1,7 @@
 """Settings every Python test shares."""
 
 import matplotlib
+import pytest
 from hypothesis import settings
 
 # No display is needed, and a slow machine is no failure. The quick tier draws the same examples every time;
@@ -9,3 +10,6 @@ matplotlib.use("Agg")
 settings.register_profile("quick", deadline=None, derandomize=True)
 settings.register_profile("full", deadline=None, max_examples=1000, print_blob=True)
 settings.load_profile("quick")
+
+# The helpers of the tests with real processes hold fixtures and assertions.
+pytest.register_assert_rewrite("two_processes")
