@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from quasilpv.experiments.result import TrackResult
+from quasilpv.experiments.result import Disturbance, TrackResult
 from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.style import (
     BLACK,
@@ -32,7 +32,7 @@ def path_figure(result: TrackResult) -> Figure:
     """
     reference, actual = result.reference_position_m, result.tool_position_m
     error = actual - reference
-    factor = _exaggeration(error, reference)
+    factor = exaggeration(error, reference)
     with style():
         figure = new_figure(4.0, f"{result.title}: path of the tool")
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -62,7 +62,7 @@ def error_figure(result: TrackResult) -> Figure:
             axes.plot(result.run.time_s, shown, color=BLUE, linewidth=0.8)
             axes.set_ylabel(f"{name} error ({unit.name})")
             axes.set_title(f"rms {rms:.3g} {unit.name} (shaded), largest {peak:.3g} {unit.name}")
-        _label_time(axes, result)
+        label_time(axes, result.run.time_s)
         return figure
 
 
@@ -72,13 +72,13 @@ def torque_figure(result: TrackResult) -> Figure:
     with style():
         figure = new_figure(4.4, f"{result.title}: applied torque")
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        _plot_joints(upper, time_s, torque)
-        _plot_joints(lower, time_s[1:], np.diff(torque, axis=0), linewidth=0.5)
+        plot_joints(upper, time_s, torque)
+        plot_joints(lower, time_s[1:], np.diff(torque, axis=0), linewidth=0.5)
         upper.set_ylabel("torque (N m)")
         lower.set_ylabel("increment (N m)")
         lower.set_title(f"per sample, rms over the joints {result.metrics.rms_torque_increment_nm:.3g} N m")
         legend_above(upper)
-        _label_time(lower, result)
+        label_time(lower, time_s)
         return figure
 
 
@@ -96,15 +96,11 @@ def disturbance_figure(result: TrackResult) -> Figure:
             1.7 * result.run.joints + 0.6, f"{result.title}: disturbance as {disturbance.quantity}, and its estimate"
         )
         for joint, axes in enumerate(figure.subplots(result.run.joints, 1, sharex=True, squeeze=False)[:, 0]):
-            true, estimate = disturbance.values[:, joint], result.run.filtered_disturbance[:, joint]
-            axes.plot(result.run.time_s, estimate, color=ORANGE, linewidth=1.8, label="estimate")
-            axes.plot(result.run.time_s, true, color=BLACK, linewidth=0.7, label="true")
-            axes.set_title(f"rms of the difference {np.sqrt(np.mean((estimate - true) ** 2)):.3g} {disturbance.unit}")
-            axes.set_ylabel(f"joint {joint + 1} ({disturbance.unit})")
+            axes.set_title(f"rms of the difference {plot_disturbance(axes, result, disturbance, joint)}")
             if joint == 0:
                 legend_above(axes)
         figure.align_ylabels()
-        _label_time(axes, result)
+        label_time(axes, result.run.time_s)
         return figure
 
 
@@ -118,22 +114,33 @@ def velocity_figure(result: TrackResult) -> Figure:
             axes.set_ylabel(f"joint {joint + 1} (rad/s)")
             axes.set_title(f"rms {np.sqrt(np.mean(error[:, joint] ** 2)):.2g} rad/s")
         figure.align_ylabels()
-        _label_time(axes, result)
+        label_time(axes, result.run.time_s)
         return figure
 
 
-def _plot_joints(axes: Axes, time_s: FloatArray, values: FloatArray, linewidth: float = 0.9) -> None:
+def plot_disturbance(axes: Axes, result: TrackResult, disturbance: Disturbance, joint: int) -> str:
+    """Draw the true disturbance on one joint and its estimate; return the rms of their difference with its unit."""
+    true, estimate = disturbance.values[:, joint], result.run.filtered_disturbance[:, joint]
+    axes.plot(result.run.time_s, estimate, color=ORANGE, linewidth=1.8, label="estimate")
+    axes.plot(result.run.time_s, true, color=BLACK, linewidth=0.7, label="true")
+    axes.set_ylabel(f"joint {joint + 1} ({disturbance.unit})")
+    return f"{np.sqrt(np.mean((estimate - true) ** 2)):.3g} {disturbance.unit}"
+
+
+def plot_joints(axes: Axes, time_s: FloatArray, values: FloatArray, linewidth: float = 0.9) -> None:
+    """Draw one line per column, in the colours of the joints."""
     for joint in range(values.shape[1]):
         colour = JOINT_COLOURS[joint]
         axes.plot(time_s, values[:, joint], color=colour, linewidth=linewidth, label=f"joint {joint + 1}")
 
 
-def _label_time(axes: Axes, result: TrackResult) -> None:
+def label_time(axes: Axes, time_s: FloatArray) -> None:
+    """Label the axis of time and end it where the run ends."""
     axes.set_xlabel("time (s)")
-    axes.set_xlim(0.0, float(result.run.time_s[-1]))
+    axes.set_xlim(0.0, float(time_s[-1]))
 
 
-def _exaggeration(error: FloatArray, reference: FloatArray) -> float:
+def exaggeration(error: FloatArray, reference: FloatArray) -> float:
     """The round factor (1, 2 or 5 times a power of ten) that makes the largest error about a tenth of the extent."""
     largest = float(np.max(np.hypot(*error.T)))
     extent = float(np.max(np.ptp(reference, axis=0)))
