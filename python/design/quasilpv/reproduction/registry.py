@@ -1,4 +1,4 @@
-"""The items known by id: one line per file, in the order of the source."""
+"""The items known by id: one line per file, by chapter."""
 
 from __future__ import annotations
 
@@ -14,6 +14,10 @@ from quasilpv.reproduction import (
     lumped_premises,
     nonquadratic,
     overbounding,
+    stabilised_arms,
+    tracking_hinf,
+    tracking_parallel,
+    tracking_serial,
 )
 from quasilpv.reproduction.item import Item
 
@@ -26,7 +30,11 @@ ITEMS: dict[str, Item] = {
         chapter_two_analysis,
         chapter_two_design,
         nonquadratic,
+        stabilised_arms,
         chapter_three,
+        tracking_hinf,
+        tracking_serial,
+        tracking_parallel,
         lumped_premises,
         complexity_tables,
         conservatism,
