@@ -7,11 +7,16 @@ from functools import cache
 from itertools import product
 from typing import Any
 
+import hypothesis.extra.numpy as hnp
 import numpy as np
 import pytest
 from flint import fmpq
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from quasilpv import _runtime
 from quasilpv.artifact import Artifact
+from quasilpv.artifact.canonical import canonical_json
 from quasilpv.certificate import verify
 from quasilpv.certificate.exact_matrices import rational
 from quasilpv.certificate.gate import robust_gate
@@ -189,6 +194,39 @@ def test_when_gains_are_premultiplied_too_expect_the_same_loop() -> None:
         arguments = (50.0,) if name == "disturbance_gains" else ()
         assert getattr(other, name)(*arguments) == pytest.approx(getattr(plain, name)(*arguments), rel=1e-6)
     assert other.torque_activity([1e-6]) == pytest.approx(plain.torque_activity([1e-6]), rel=1e-9)
+
+
+@given(
+    hnp.arrays(float, (4, 2), elements=st.floats(-1.0, 1.0)),
+    st.floats(-1.138, -0.488),
+    st.floats(0.521, 1.106),
+)
+@settings(max_examples=50)
+def test_when_ctc_is_stepped_expect_the_parallel_computed_torque_with_passive_joints_reconstructed(
+    drawn: np.ndarray, theta_1: float, theta_2: float
+) -> None:
+    """(IV.78), the sign of N_b corrected: passive angles and speeds from the closure, the constrained M, N and G."""
+    errors, omega, speed_error, reference_acceleration = drawn
+    y, speed = np.array([theta_1, theta_2]), 2.0 * omega
+    reference, rate = y + 1e-4 * errors, speed + 1e-2 * speed_error
+    artifact = released(2000.0, "ctc")
+    law = artifact.content()["law"]
+    controller = _runtime.Controller(_runtime.Artifact.parse(canonical_json(artifact.to_document())))
+    acceleration = 10.0 * reference_acceleration
+    report = controller.step(y, reference, rate, acceleration, speed)
+    command = acceleration + np.array(law["gp"]) * (reference - y) + np.array(law["gd"]) * (rate - speed)
+
+    linkage = ROBOT.model.linkage  # type: ignore[attr-defined]
+    phi = linkage.coordinates(y)
+    J, M, G = linkage.closure_jacobian(phi), linkage.mass_matrix(phi), linkage.gravity_torque(phi)
+    J_a, J_b = J[:, :2], -J[:, 2:]
+    whole = np.concatenate([speed, np.linalg.solve(J_b, J_a @ speed)])
+    passive = np.linalg.solve(J_b, J_a @ command + linkage.closure_drift(phi, whole))
+    N = linkage.speed_torque(phi, whole)
+    active = M[:2, :2] @ command + M[:2, 2:] @ passive + N[:2] + G[:2]
+    carried = M[2:, :2] @ command + M[2:, 2:] @ passive + N[2:] + G[2:]
+    expected = active + J_a.T @ np.linalg.solve(J_b.T, carried)
+    np.testing.assert_allclose(report.torque_commanded[:2], expected, rtol=0, atol=1e-11 * (1 + np.abs(command).max()))
 
 
 # ---- closed loops ----------------------------------------------------------------------------------------------------

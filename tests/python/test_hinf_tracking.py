@@ -25,7 +25,7 @@ from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
 from quasilpv.scenarios import Sensors
 from quasilpv.synthesis import Specification
-from quasilpv.synthesis.hinf_tracking import FRICTION_NM_S, unknown_torques
+from quasilpv.synthesis.hinf_tracking import unknown_torques
 from quasilpv.synthesis.torque_schedule import full_schedule
 from quasilpv.systems.registry import robot
 from reference.mutants import BLOCKS, Mutant
@@ -80,7 +80,7 @@ def test_when_states_and_payloads_are_drawn_expect_the_torque_as_a_sum_of_unknow
     rng = np.random.default_rng(3)
     for _ in range(200):
         plant = arm.with_payload_fraction(rng.uniform())
-        friction = rng.uniform(-FRICTION_NM_S, FRICTION_NM_S, n)
+        friction = rng.uniform(-arm.friction_bound_nm_s, arm.friction_bound_nm_s, n)
         theta = rng.uniform(*np.array(arm.domain.angle_rad).T)
         omega = rng.uniform(*np.array(arm.domain.speed_rad_s).T)
         alpha, W = np.cumsum(theta), np.cumsum(omega)
@@ -96,10 +96,10 @@ def test_when_states_and_payloads_are_drawn_expect_the_torque_as_a_sum_of_unknow
 
 
 def test_when_the_checker_bounds_the_unknown_terms_itself_expect_those_of_the_design() -> None:
-    for robot_id in ("arm2", "arm3"):
+    for robot_id in ("arm2", "arm3", "fivebar"):
         arm = robot(robot_id)
         content = release(robot_id, "pid").artifact.content()
-        content["witness"] = {"feedback": {"friction_nm_s": FRICTION_NM_S}}
+        content["witness"] = {"feedback": {"friction_nm_s": arm.friction_bound_nm_s}}
         terms, unknown = unknown_terms(content), unknown_torques(arm)
         assert len(terms) == len(unknown.radius)
         for k, term in enumerate(terms):

@@ -36,9 +36,6 @@ from quasilpv.systems.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
 
-FRICTION_NM_S = 10.0
-"""Largest viscous friction coefficient of a joint (Dehak 2022, III.3.3)."""
-
 DECAY = 0.4
 """Decay rate over the bandwidth."""
 
@@ -69,7 +66,7 @@ def unknown_torques(robot: Robot) -> UnknownTorques:
     D = heaviest.inertia_constants
     coriolis = [(S[k], [none, S[j], none], abs(D[k, j]) * speed[j]) for k in range(n) for j in range(n) if k != j]
     gravity = [(S[k], [S[k], none, none], heaviest.gravity_constants[k]) for k in range(n)]
-    friction = [(e[k], [none, e[k], none], FRICTION_NM_S) for k in range(n)]
+    friction = [(e[k], [none, e[k], none], robot.friction_bound_nm_s) for k in range(n)]
     torque, state, radius = zip(*coriolis, *gravity, *friction, strict=True)
     return UnknownTorques(np.array(torque), np.array([np.concatenate(c) for c in state]), np.array(radius))
 
@@ -226,7 +223,7 @@ def _tracking_design(search: _Search, tables: HinfTables, loops: LoopGrid) -> Tr
                 "beta": point.beta,
                 "bandwidth_rad_s": point.rate,
                 "inertia_unit_kg_m2": point.inertia_unit,
-                "friction_nm_s": FRICTION_NM_S,
+                "friction_nm_s": robot.friction_bound_nm_s,
                 "tau": point.tau.tolist(),
             }
         },

@@ -28,6 +28,8 @@ class Robot:
         payloads: the plants a robust design must cover.
         disturbance_frequency_rad_s: the fastest disturbance its controllers are tuned to reject.
         printed_bandwidth_rad_s: triple pole of the gains that Dehak (2022) prints for PID and computed torque.
+        friction_bound_nm_s: largest viscous friction coefficient of a joint that `hinf-tracking` has to withstand,
+            N m s/rad; the model itself may have none.
     """
 
     id: str
@@ -38,6 +40,7 @@ class Robot:
     payloads: PayloadSet
     disturbance_frequency_rad_s: float = 20.0
     printed_bandwidth_rad_s: float = 15.0 * pi
+    friction_bound_nm_s: float = 10.0
 
     def with_payload_fraction(self, fraction: float) -> PlanarMechanism:
         """The plant at a payload fraction in [0, 1]; 0 is the nominal robot. See `PayloadSet`."""
@@ -123,7 +126,7 @@ def _arm3() -> Robot:
     """The operating domain is the box of the default trajectories widened by 0.1 rad and 1.5 times their speeds.
 
     The payload is the perturbation of Dehak 2022, IV.5.1 (+40 % on links 1 and 2, +120 % on link 3, both mass and
-    centre of mass).
+    centre of mass), the bound on friction that of III.3.3.
     """
     return Robot(
         id="arm3",
@@ -176,7 +179,7 @@ def _fivebar() -> Robot:
 
     The payload is the perturbation of Dehak 2022, IV.5.2 (+40 % on the mass of the active links, +120 % on that of the
     passive ones, centres of mass as they are). Limits are a choice of this project: they leave room for the disturbance
-    of 100 N m.
+    of 100 N m, and for friction that takes 0.4 s to stop a link.
     """
     return Robot(
         id="fivebar",
@@ -190,6 +193,7 @@ def _fivebar() -> Robot:
         payloads=PayloadSet(mass_scale=(1.4, 2.2), com_scale=(1.0, 1.0)),
         disturbance_frequency_rad_s=50.0,
         printed_bandwidth_rad_s=80.0 * pi,
+        friction_bound_nm_s=0.01,
     )
 
 
