@@ -153,7 +153,7 @@ def _velocity_premises(
 def _stiffness_premises(
     mechanism: PlanarMechanism, alpha: list[sp.Expr], gravity: list[sp.Expr]
 ) -> tuple[sp.Expr, ...]:
-    if all(g == 0 for g in gravity):
+    if not mechanism.gravity_constants.any():
         return ()
     sincs = [sp.sinc(angle) for angle in alpha]
     if mechanism.printed_coriolis_shift and mechanism.joints == 2:
