@@ -20,7 +20,8 @@ from quasilpv.cli.options import (
     sensors_of,
 )
 from quasilpv.cli.results import COLUMNS, cells
-from quasilpv.experiments.hil import HilResult, Mode, require_identical, run_over_lcm
+from quasilpv.errors import FaultStop
+from quasilpv.experiments.hil import HilResult, Mode, RealTimeOptions, require_identical, run_over_lcm
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.track import PlantKind, TrackingExperiment, track, variant_of
 from quasilpv.scenarios import ENCODER_BITS
@@ -35,6 +36,15 @@ def hil_command(
     scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario id, see design list.")],
     *,
     real_time: Annotated[bool, typer.Option("--real-time", help="Paced by the clock instead of lock-step.")] = False,
+    silence_s: Annotated[
+        float, typer.Option("--silence-s", min=1e-3, help="Real time: fault after so long without a measurement.")
+    ] = RealTimeOptions.silence_s,
+    hold_s: Annotated[
+        float, typer.Option("--hold-s", min=1e-3, help="Real time: the plant brakes after so long without a command.")
+    ] = RealTimeOptions.hold_s,
+    priority: Annotated[
+        int | None, typer.Option("--priority", min=1, max=99, help="Real time: lock memory, use SCHED_FIFO.")
+    ] = None,
     controller: Annotated[str, typer.Option("--controller", metavar="ID")] = DEFAULT_CONTROLLER,
     artifact: ArtifactOption = None,
     rate_hz: RateOption = None,
@@ -48,7 +58,8 @@ def hil_command(
     """Run a scenario with controller and plant as two processes over LCM, and once more in this process.
 
     In lock-step both runs must be identical, bit for bit (exit code 1 if they are not). With --real-time the rms of
-    both is printed with the measured wake-up and round-trip latencies beside it.
+    both is printed with the measured wake-up and round-trip latencies beside it. A run that a fault stopped is printed
+    all the same, and ends with exit code 3.
 
     \b
     Example:
@@ -69,14 +80,25 @@ def hil_command(
         steps.end()
         steps.begin("over LCM")
         mode: Mode = "realtime" if real_time else "lockstep"
-        over_lcm = run_over_lcm(experiment, chosen, folder, plant=kind, sensors=sensors, mode=mode, variant=variant)
+        over_lcm = run_over_lcm(
+            experiment,
+            chosen,
+            folder,
+            plant=kind,
+            sensors=sensors,
+            mode=mode,
+            real_time=RealTimeOptions(silence_s, hold_s, priority),
+            variant=variant,
+        )
         steps.end()
-    if not real_time:
+    if not real_time and over_lcm.fault is None:
         require_identical(over_lcm.result.run, in_process.run)
     if json:
         print_json(_row(over_lcm, in_process))
     else:
         _print(over_lcm, in_process)
+    if over_lcm.fault is not None:
+        raise FaultStop(over_lcm.fault)
 
 
 def _row(over_lcm: HilResult, in_process: TrackResult) -> dict[str, Any]:
@@ -86,6 +108,7 @@ def _row(over_lcm: HilResult, in_process: TrackResult) -> dict[str, Any]:
         "samples": int(over_lcm.result.run.time_s.size),
         "identical_to_in_process": over_lcm.result.run.first_difference(in_process.run) is None,
         "in_process": in_process.metrics.as_dict(),
+        "fault": over_lcm.fault,
         "controller_report": over_lcm.controller,
         "simulator_report": over_lcm.simulator,
     }
@@ -101,7 +124,11 @@ def _print(over_lcm: HilResult, in_process: TrackResult) -> None:
         for name, latency in latencies.items()
     ]
     print_table("latency at the plant, us", ("", *QUANTILES), rows)
-    if over_lcm.mode == "lockstep":
+    if over_lcm.fault is not None:
+        post_mortem = over_lcm.controller["post_mortem"]
+        seq = post_mortem["seq"] if post_mortem else []
+        print(f"stopped by a fault; the last {len(seq)} samples before it are in --json, controller_report.post_mortem")
+    elif over_lcm.mode == "lockstep":
         print(f"{over_lcm.result.run.time_s.size} samples, identical to the run in process")
     else:
         print(", ".join(f"{name.replace('_', ' ')}: {over_lcm.simulator[name]}" for name in COUNTERS))

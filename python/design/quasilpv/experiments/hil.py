@@ -16,7 +16,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from quasilpv.artifact import Artifact
-from quasilpv.errors import ClaimError, FaultStop, InputError, PlantError, QuasilpvError, TransportError
+from quasilpv.errors import ClaimError, InputError, PlantError, QuasilpvError, TransportError
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import FloatArray, Run
 from quasilpv.experiments.track import (
@@ -39,7 +39,30 @@ SILENCE_S = 10.0
 LOCK_STEP_LIMIT_S = 600.0
 """Nothing in lock-step bounds the run but the processes; this does."""
 
-_ERRORS: dict[int, type[QuasilpvError]] = {3: FaultStop, 5: TransportError, 6: PlantError}
+EXIT_FAULT_STOP = 3
+"""The run ended in a fault: an outcome with a report, not an error of the program."""
+
+_ERRORS: dict[int, type[QuasilpvError]] = {5: TransportError, 6: PlantError}
+
+
+@dataclass(frozen=True)
+class RealTimeOptions:
+    """What both processes are asked for in real time.
+
+    Attributes:
+        silence_s: the controller latches a fault after so long without a measurement.
+        hold_s: the plant's watchdog brakes after so long without a command.
+        priority: lock memory and use SCHED_FIFO with this priority, 1 to 99; None: normal scheduling.
+    """
+
+    silence_s: float = 0.02
+    hold_s: float = 0.02
+    priority: int | None = None
+
+    def of(self, program: str) -> list[str]:
+        """Options of one program."""
+        options = ["--silence-s", str(self.silence_s)] if program == CONTROLLER else ["--hold-s", str(self.hold_s)]
+        return options if self.priority is None else [*options, "--priority", str(self.priority)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +74,14 @@ class HilResult:
         result: the numbers of the run.
         controller: what `qlpv-controller` reports: steps, counters, latencies in ns.
         simulator: what `qlpv-simulator` reports, likewise.
+        fault: why a fault stopped the run, in the words of the program that says so; None if it was none.
     """
 
     mode: Mode
     result: TrackResult
     controller: dict[str, Any]
     simulator: dict[str, Any]
+    fault: str | None = None
 
 
 def run_over_lcm(
@@ -67,6 +92,7 @@ def run_over_lcm(
     plant: PlantKind,
     sensors: Sensors,
     mode: Mode,
+    real_time: RealTimeOptions | None = None,
     variant: Variant | None = None,
 ) -> HilResult:
     """Run controller and plant as two processes on this machine, with a session and a port of their own.
@@ -78,25 +104,28 @@ def run_over_lcm(
         plant: the true plant.
         sensors: encoders and speed noise.
         mode: lock-step (deterministic) or real time.
+        real_time: watchdog times and priority, read in real time only.
         variant: what to call the controller, by default its law kind.
 
     Raises:
         InputError: robot and controller do not fit, an executable is missing, or the folder cannot be written.
-        FaultStop: the controller stopped the run.
         TransportError: the processes did not hear each other.
         PlantError: the plant could not be integrated.
     """
     files = write_run_files(folder, experiment, artifact, plant=plant, sensors=sensors)
     records = {CONTROLLER: folder / "controller.csv", SIMULATOR: folder / "plant.csv"}
     commands = _commands(files, records, mode)
+    if mode == "realtime":
+        commands = {name: [*command, *(real_time or RealTimeOptions()).of(name)] for name, command in commands.items()}
     limit_s = LOCK_STEP_LIMIT_S if mode == "lockstep" else experiment.trajectory.duration_s + 4 * SILENCE_S
-    reports = _run_both(commands, limit_s)
+    reports, fault = _run_both(commands, limit_s)
     run = merge_records(records[SIMULATOR], records[CONTROLLER], artifact)
     return HilResult(
         mode,
         summarise(run, experiment, artifact, plant=plant, sensors=sensors, variant=variant),
         reports[CONTROLLER],
         reports[SIMULATOR],
+        fault,
     )
 
 
@@ -176,8 +205,11 @@ def _commands(files: RunFiles, records: dict[str, Path], mode: Mode) -> dict[str
     }
 
 
-def _run_both(commands: dict[str, list[str]], limit_s: float) -> dict[str, dict[str, Any]]:
-    """Run the processes to their end and return their reports; if one fails, the others are stopped."""
+def _run_both(commands: dict[str, list[str]], limit_s: float) -> tuple[dict[str, dict[str, Any]], str | None]:
+    """Run the processes to their end and return their reports, and why if a fault stopped them.
+
+    If one fails, the others are stopped. A fault stop is no failure: the other process ends by itself.
+    """
     processes = {
         name: subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         for name, command in commands.items()
@@ -185,15 +217,18 @@ def _run_both(commands: dict[str, list[str]], limit_s: float) -> dict[str, dict[
     try:
         deadline = time.monotonic() + limit_s
         while any(process.poll() is None for process in processes.values()):
-            if any(process.returncode for process in processes.values()):
+            if any(process.returncode not in (None, 0, EXIT_FAULT_STOP) for process in processes.values()):
                 break
             if time.monotonic() > deadline:
                 raise TransportError(f"{' and '.join(commands)}: still running after {limit_s:g} s")
             time.sleep(POLL_S)
-        failed = [name for name, process in processes.items() if process.returncode]
-        for name in failed:
-            _raise_failure(name, processes[name])
-        return {name: json.loads(process.communicate()[0]) for name, process in processes.items()}
+        for name, process in processes.items():
+            if process.returncode not in (None, 0, EXIT_FAULT_STOP):
+                _raise_failure(name, process)
+        said = {name: process.communicate() for name, process in processes.items()}
+        stopped = [name for name, process in processes.items() if process.returncode == EXIT_FAULT_STOP]
+        fault = said[stopped[0]][1].strip().splitlines()[-1] if stopped else None
+        return {name: json.loads(output) for name, (output, _) in said.items()}, fault
     finally:
         for process in processes.values():
             if process.poll() is None:
@@ -203,18 +238,8 @@ def _run_both(commands: dict[str, list[str]], limit_s: float) -> dict[str, dict[
 
 def _raise_failure(program: str, process: subprocess.Popen[str]) -> None:
     """Raise the exception that the exit code of an ended process stands for, in its own words."""
-    output, errors = process.communicate()
-    line = errors.strip().splitlines()[-1].removeprefix(f"{program}: ") if errors.strip() else _ending(output)
+    errors = process.communicate()[1].strip()
+    line = errors.splitlines()[-1].removeprefix(f"{program}: ") if errors else "not a word"
     if process.returncode == 2:
         raise InputError(program, "input", line, "files both programs accept")
     raise _ERRORS.get(process.returncode, QuasilpvError)(f"{program}: exit code {process.returncode}: {line}")
-
-
-def _ending(output: str) -> str:
-    """How a run ended, from the report of a process that had no error of its own."""
-    try:
-        report = json.loads(output)
-    except ValueError:
-        return "no report"
-    fields = ("end", "controller_state", "state", "fault_cause", "last_seq", "samples")
-    return ", ".join(f"{name.replace('_', ' ')} {report[name]}" for name in fields if name in report)
