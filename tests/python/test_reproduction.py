@@ -32,7 +32,7 @@ ROOT = Path(__file__).parents[2]
 REQUIRED = {
     *(f"fig-I.{k}" for k in (2, 4, 5, 7)),
     *(f"fig-II.{k}" for k in (1, 2, 3, 4, 5, 6, 7)),
-    *(f"fig-III.{k}" for k in (1, 3, 5, 6, 7, 8)),
+    *(f"fig-III.{k}" for k in (1, 3, 4, 5, 6, 7, 8)),
     *(f"fig-IV.{k}" for k in (3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 14, 15, 16)),
     *(f"table-I.{k}" for k in (2, 5)),
     *(f"table-II.{k}" for k in (1, 2, 3, 4)),

@@ -18,7 +18,7 @@ from quasilpv.experiments.metrics import Metrics
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.figures.constraint import constraint_figure
 from quasilpv.figures.side_by_side import disturbance_estimates, input_columns, speed_errors, tracking_columns
-from quasilpv.figures.stabilisation import regulation_figure
+from quasilpv.figures.stabilisation import regulation_figure, rolling_disc_figure
 from quasilpv.release import to_artifact
 from quasilpv.reproduction import rules, stabilised_arms, tracking_claims
 from quasilpv.reproduction.closed_loops import (
@@ -29,7 +29,7 @@ from quasilpv.reproduction.closed_loops import (
     outcome,
     without_disturbance_states,
 )
-from quasilpv.reproduction.closure import closure_along
+from quasilpv.reproduction.constraints import closure_along, rolling_along
 from quasilpv.reproduction.tracking_claims import Printed
 from quasilpv.synthesis import Specification, synthesise
 from quasilpv.systems.registry import robot
@@ -156,9 +156,21 @@ def test_when_an_arm_comes_to_rest_expect_v_to_fall_and_the_same_run_backwards_t
 def test_when_links_are_unequal_expect_the_loop_closed_and_the_integration_to_follow_the_run() -> None:
     closed_loop = outcome(ClosedLoop("fivebar-spiral", "ctc", 2000.0))
     equal, unequal = (closure_along(closed_loop, length) for length in (0.165, 0.2))
-    assert equal.error_m.max() < 1e-15 < unequal.error_m.max() < 1e-9
+    assert equal.error.max() < 1e-15 < unequal.error.max() < 1e-9
     assert max(equal.replay_deviation_rad, unequal.replay_deviation_rad) < 1e-5
-    assert len(equal.time_s) == len(equal.error_m) == len(closed_loop.result.run.time_s)
+    assert len(equal.time_s) == len(equal.error) == len(closed_loop.result.run.time_s)
+
+
+@pytest.mark.usefixtures("in_a_folder_of_its_own")
+def test_when_the_disc_rolls_expect_the_force_that_accelerates_its_centre() -> None:
+    loop = outcome(ClosedLoop("stabilise-spring-disc", "robust", 1000.0, sensors=EXACT))
+    replay, rolling = rolling_along(loop)
+    assert rolling.error.max() < 1e-12
+    assert rolling.replay_deviation_rad < 1e-5
+    x1, x2, _, contact = replay.states[0]
+    np.testing.assert_allclose([x1, x2], [-5.0, 10.0])
+    acceleration = (replay.torque_nm[0, 0] / 2.0 - x1 - x1**3 - 2.0 * x2) / (0.1 + 1.0 / 4.0)  # M + J_delta / r^2
+    assert contact == pytest.approx(0.1 * acceleration + x1 + x1**3 + 2.0 * x2)
 
 
 def side_by_side(joints: int) -> dict[str, TrackResult]:
@@ -188,6 +200,8 @@ def test_when_regulation_and_constraints_are_drawn_expect_no_text_cut_or_over_an
     assert_readable(regulation_figure(run, np.exp(-3.0 * run.time_s), 1.0, TITLE))
     errors = {"b = 0.165 m": (run.time_s, np.zeros_like(run.time_s)), "b = 0.2 m": (run.time_s, 1e-11 + run.time_s)}
     assert_readable(constraint_figure(errors, "|h| (m)", TITLE))
+    states = np.exp(-run.time_s)[:, None] * [-5.0, 10.0, 5.0, -80.0]
+    assert_readable(rolling_disc_figure(run.time_s, states, run.torque_nm[:, 0], 0.0 * run.time_s, TITLE))
 
 
 def test_when_a_law_estimates_no_disturbance_expect_no_figure_of_it() -> None:

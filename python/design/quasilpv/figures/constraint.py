@@ -11,7 +11,7 @@ from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.style import JOINT_COLOURS, legend_above, new_figure, style
 from quasilpv.figures.tracking import label_time
 
-_FLOOR = 1e-18
+SMALLEST_DRAWN = 1e-18
 """What an error of exactly zero is drawn as."""
 
 
@@ -28,7 +28,7 @@ def constraint_figure(errors: Mapping[str, tuple[FloatArray, FloatArray]], label
         axes = figure.subplots()
         for colour, (name, (time_s, error)) in zip(JOINT_COLOURS, errors.items(), strict=False):
             text = f"{name}, largest {error.max():.1e}"
-            axes.semilogy(time_s, np.maximum(error, _FLOOR), color=colour, linewidth=0.7, label=text)
+            axes.semilogy(time_s, np.maximum(error, SMALLEST_DRAWN), color=colour, linewidth=0.7, label=text)
             label_time(axes, time_s)
         axes.set_ylabel(label)
         legend_above(axes)

@@ -1,4 +1,4 @@
-"""Figure of an arm that comes to rest: angles, speeds, torques, and the Lyapunov function of the certificate."""
+"""Figures of plants that come to rest: an arm with the Lyapunov function of its certificate, and a rolling disc."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from quasilpv.experiments.run import FloatArray, Run
-from quasilpv.figures.style import BLUE, REFERENCE_COLOUR, new_figure, style
+from quasilpv.figures.constraint import SMALLEST_DRAWN
+from quasilpv.figures.style import BLUE, JOINT_COLOURS, REFERENCE_COLOUR, new_figure, style
 from quasilpv.figures.tracking import label_time, plot_joints
 
 
@@ -39,4 +40,36 @@ def regulation_figure(run: Run, lyapunov: FloatArray, decay_per_s: float, title:
         figure.legend(*angle.get_legend_handles_labels(), loc="outside lower center", ncols=run.joints)
         for axes in (torque, energy):
             label_time(axes, run.time_s)
+        return figure
+
+
+def rolling_disc_figure(
+    time_s: FloatArray, states: FloatArray, torque_nm: FloatArray, slip_m_s: FloatArray, title: str
+) -> Figure:
+    """Draw a rolling disc that comes to rest.
+
+    Args:
+        time_s: (N,).
+        states: (N, 4) position of the centre (m), its speed (m/s), angular speed (rad/s), contact force (N).
+        torque_nm: (N,).
+        slip_m_s: (N,) absolute value of the algebraic equation, 0 while it rolls.
+        title: of the figure.
+    """
+    with style():
+        figure = new_figure(4.6, title)
+        (moving, contact), (torque, slip) = figure.subplots(2, 2, sharex=True)
+        for colour, values, label in zip(
+            JOINT_COLOURS, states.T[:3], ("x₁ (m)", "x₂ (m/s)", "x₃ (rad/s)"), strict=False
+        ):
+            moving.plot(time_s, values, color=colour, label=label)
+        moving.set_ylabel("x₁, x₂, x₃ (units beside)")
+        moving.legend()
+        contact.plot(time_s, states[:, 3], color=BLUE)
+        contact.set_ylabel("contact force λ (N)")
+        torque.plot(time_s, torque_nm, color=BLUE)
+        torque.set_ylabel("torque u (N m)")
+        slip.semilogy(time_s, np.maximum(slip_m_s, SMALLEST_DRAWN), color=BLUE, linewidth=0.7)
+        slip.set_ylabel("|x₂ − r x₃| (m/s)")
+        for axes in (torque, slip):
+            label_time(axes, time_s)
         return figure

@@ -58,7 +58,8 @@ def claims(name: str, closed_loop: Outcome) -> list[Check]:
     ]
 
 
-def _computed(closed_loop: Outcome) -> dict[str, object]:
+def computed(closed_loop: Outcome) -> dict[str, object]:
+    """What is reported of a run, JSON-able."""
     run, V = closed_loop.result.run, lyapunov_along(closed_loop)
     return closed_loop.described() | {
         "lyapunov_start": float(V[0]),
@@ -80,14 +81,14 @@ def _fig_i2(_: Effort) -> Finding:
         for name, loop in loops.items()
     }
     checks = [check for name, loop in loops.items() for check in claims(name, loop)]
-    return Finding(checks, {name: _computed(loop) for name, loop in loops.items()}, figures)
+    return Finding(checks, {name: computed(loop) for name, loop in loops.items()}, figures)
 
 
 def _fig_ii6(_: Effort) -> Finding:
     loop = _stabilised("stabilise-arm3", "descriptor", 4000.0)
     title = "3-DoF arm, m₃ = 1 kg, |θ| ≤ π, law (II.38) of Theorem II.6 at 4 kHz"
     figure = regulation_figure(loop.result.run, lyapunov_along(loop), _decay(loop), title)
-    return Finding(claims("Theorem II.6", loop), _computed(loop), {"": figure})
+    return Finding(claims("Theorem II.6", loop), computed(loop), {"": figure})
 
 
 SENSORS = "angles and speeds are measured exactly, speeds filtered over two samples; the law is sampled"

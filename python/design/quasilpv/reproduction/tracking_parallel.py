@@ -6,7 +6,7 @@ from quasilpv.figures.constraint import constraint_figure
 from quasilpv.figures.side_by_side import input_columns, speed_errors, tracking_columns
 from quasilpv.reproduction import rules, tracking_claims
 from quasilpv.reproduction.closed_loops import ClosedLoop, Observer, Outcome, described, outcome, results
-from quasilpv.reproduction.closure import closure_along
+from quasilpv.reproduction.constraints import closure_along
 from quasilpv.reproduction.item import Effort, Finding, Item
 from quasilpv.reproduction.tracking_claims import Printed
 from quasilpv.scenarios import VELOCITY_NOISE_RAD_S
@@ -102,7 +102,7 @@ def _estimates(_: Effort) -> Finding:
 def _closure(_: Effort) -> Finding:
     run = _law("fivebar-spiral")
     along = {f"b = {length:g} m": closure_along(run, length) for length in PASSIVE_LENGTHS_M}
-    largest = {name: float(closure.error_m.max()) for name, closure in along.items()}
+    largest = {name: float(closure.error.max()) for name, closure in along.items()}
     checks = [
         rules.at_most("largest |h| over the run (m)", dict.fromkeys(largest, CLOSED_M), largest),
         rules.at_most(
@@ -111,7 +111,7 @@ def _closure(_: Effort) -> Finding:
             {name: closure.replay_deviation_rad for name, closure in along.items()},
         ),
     ]
-    curves = {name: (closure.time_s, closure.error_m) for name, closure in along.items()}
+    curves = {name: (closure.time_s, closure.error) for name, closure in along.items()}
     return Finding(
         checks,
         {"largest |h| (m)": largest, **described({LAW: run})},
