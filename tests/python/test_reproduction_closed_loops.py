@@ -26,6 +26,7 @@ from quasilpv.reproduction.closed_loops import (
     ClosedLoop,
     Outcome,
     chapter_three,
+    gains,
     outcome,
     without_disturbance_states,
 )
@@ -124,8 +125,12 @@ def test_an_observer_without_disturbance_keeps_the_gains_of_angles_and_speeds_an
     assert reduced.verification is None
     assert {**reduced.content()["law"], "observer": None} == {**whole.content()["law"], "observer": None}
     if controller == "dob-acceleration":
+        assert gains(whole)["law"]["feedback"] == whole.content()["law"]["feedback"]
         assert reduced.law.observer == (*whole.law.observer[:2], 0.0, 0.0)
         return
+    bounds = gains(whole)["law"]["feedback_at_most"]
+    vertex = np.abs(whole.law.feedback.blocks[0].vertices[0])
+    assert all(vertex[:, 2 * k : 2 * k + 2].max() <= bounds[name] for k, name in enumerate(bounds))
     for kept, before in zip(reduced.law.observer.blocks, whole.law.observer.blocks, strict=True):
         np.testing.assert_array_equal(np.array(kept.vertices)[:, :4], np.array(before.vertices)[:, :4])
         assert not np.array(kept.vertices)[:, 4:].any()

@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from quasilpv.artifact import Artifact
+from quasilpv.artifact.laws import DobTorqueLaw
 from quasilpv.experiments.designs import kept_design
 from quasilpv.experiments.metrics import Metrics
 from quasilpv.experiments.result import TrackResult, Variant
@@ -176,12 +177,20 @@ def _upper_rows(matrix: list[list[float]], count: int) -> list[list[float]]:
 
 
 def gains(artifact: Artifact) -> dict[str, Any]:
-    """The numbers of a law that are not tables, and what its design reports, JSON-able."""
+    """The gains of a law and what its design reports, JSON-able.
+
+    Of a scheduled feedback [Kp Kd KI] the bounds that the vertices put on the entries of each part.
+    """
     law = artifact.content()["law"]
-    plain = {name: value for name, value in law.items() if name != "kind" and _is_number(value)}
-    return {"law": plain, "design": (artifact.verification or {}).get("report", {})}
+    found = {name: value for name, value in law.items() if name != "kind" and _is_plain(value)}
+    if isinstance(artifact.law, DobTorqueLaw):
+        bound = sum(np.abs(block["vertices"]).max(axis=0) for block in law["feedback"]["blocks"])
+        parts = zip(("Kp", "Kd", "KI"), np.split(bound, 3, axis=1), strict=True)
+        found["feedback_at_most"] = {name: float(part.max()) for name, part in parts}
+    return {"law": found, "design": (artifact.verification or {}).get("report", {})}
 
 
-def _is_number(value: object) -> bool:
-    """Whether a member is a number, a truth value, or a list of them: no table."""
-    return all(isinstance(entry, int | float) for entry in (value if isinstance(value, list) else [value]))
+def _is_plain(value: object) -> bool:
+    """Whether a member is a number or a truth value, or several of them: no table."""
+    members = value.values() if isinstance(value, dict) else value if isinstance(value, list) else [value]
+    return all(isinstance(entry, int | float) for entry in members)

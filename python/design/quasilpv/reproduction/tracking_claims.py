@@ -10,10 +10,23 @@ from quasilpv.experiments.metrics import Metrics
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.closed_loops import Outcome
 from quasilpv.reproduction.item import Check
+from quasilpv.scenarios import ENCODER_BITS, VELOCITY_NOISE_RAD_S
+from quasilpv.synthesis.baselines import DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S
+
+RATE_HZ = 4000.0
+"""Sample rate of controllers that are compared; those of the source are in continuous time."""
+
+PID, CTC, CTC_ALONE = "PID", "CTC with observer", "CTC without observer"
 
 DEFAULTS = "paths are the project's defaults: none is stated"
-DOB_GAIN = "the observer of CTC has 250 rad/s and is subtracted: no gain is stated, the printed sign adds it"
-SAMPLED = "4 kHz, encoders of 20 bits, speeds with noise of 0.05 rad/s and filtered: none is stated"
+DOB_GAIN = (
+    f"the observer of CTC has {DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S:g} rad/s and is subtracted: no gain is stated, the"
+    " printed sign adds it"
+)
+SAMPLED = (
+    f"{RATE_HZ / 1e3:g} kHz, encoders of {ENCODER_BITS} bits, speeds with noise of {VELOCITY_NOISE_RAD_S:g} rad/s and"
+    " filtered: none is stated"
+)
 WITHOUT = "'without DOB' is read as an observer of angles and speeds only"
 TORQUE_RATIOS = "of RMS_u ratios are compared: the printed values do not follow from the printed formula"
 

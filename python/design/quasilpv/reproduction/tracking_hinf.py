@@ -8,12 +8,10 @@ from quasilpv.figures.side_by_side import disturbance_estimates, input_columns, 
 from quasilpv.reproduction import rules, tracking_claims
 from quasilpv.reproduction.closed_loops import ClosedLoop, Outcome, described, outcome, results
 from quasilpv.reproduction.item import Check, Effort, Finding, Item
-from quasilpv.reproduction.tracking_claims import Printed
+from quasilpv.reproduction.tracking_claims import CTC, CTC_ALONE, PID, RATE_HZ, Printed
 
-RATE_HZ = 4000.0
-PID, CTC, LAW = "PID", "CTC with observer", "Theorem III.10"
+LAW = "Theorem III.10"
 CONTROLLERS = {PID: "pid", CTC: "ctc-dob", LAW: "hinf-tracking"}
-CTC_ALONE = "CTC without observer"
 
 PRINTED = {
     "square": {

@@ -8,11 +8,11 @@ from quasilpv.reproduction import rules, tracking_claims
 from quasilpv.reproduction.closed_loops import ClosedLoop, Observer, Outcome, described, outcome, results
 from quasilpv.reproduction.constraints import closure_along
 from quasilpv.reproduction.item import Effort, Finding, Item
-from quasilpv.reproduction.tracking_claims import Printed
+from quasilpv.reproduction.tracking_claims import PID, RATE_HZ, Printed
 from quasilpv.scenarios import VELOCITY_NOISE_RAD_S
 
-RATE_HZ, DEFAULT_RATE_HZ = 4000.0, 2000.0
-PID, CTC, LAW = "PID", "CTC (IV.78)", "Theorem IV.11"
+DEFAULT_RATE_HZ = 2000.0
+CTC, LAW = "CTC (IV.78)", "Theorem IV.11"
 CONTROLLERS = {PID: "pid", CTC: "ctc", LAW: "dob-torque-premultiplied"}
 PLAIN, DEFAULT = "Theorem IV.11 without beta", "default law at 2 kHz"
 

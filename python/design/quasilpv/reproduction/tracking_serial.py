@@ -10,12 +10,10 @@ from quasilpv.figures.side_by_side import disturbance_estimates, input_columns, 
 from quasilpv.reproduction import rules, tracking_claims, tracking_hinf
 from quasilpv.reproduction.closed_loops import ClosedLoop, Observer, Outcome, described, outcome, results
 from quasilpv.reproduction.item import Check, Effort, Finding, Item
-from quasilpv.reproduction.tracking_claims import Printed
+from quasilpv.reproduction.tracking_claims import CTC, CTC_ALONE, PID, RATE_HZ, Printed
 
-RATE_HZ = 4000.0
-PID, CTC, LAW = "PID", "CTC with observer", "Theorem IV.11"
+LAW, HINF, DEFAULT = "Theorem IV.11", tracking_hinf.LAW, "default law at 1 kHz"
 CONTROLLERS = {PID: "pid", CTC: "ctc-dob", LAW: "dob-torque"}
-HINF, DEFAULT, CTC_ALONE = "Theorem III.10", "default law at 1 kHz", "CTC without observer"
 
 PRINTED = {
     "square": {
