@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from quasilpv.conditions import (
+    estimated_observer,
     guerra2007,
     i1,
     i2,
@@ -41,6 +42,7 @@ CONDITIONS: dict[str, Condition] = {
         tanaka_wang.CONDITION,
         sampled_feedback.CONDITION,
         sampled_observer.CONDITION,
+        estimated_observer.CONDITION,
     )
 }
 

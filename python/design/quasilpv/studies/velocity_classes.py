@@ -28,7 +28,7 @@ import sympy as sp
 
 from quasilpv.lmi import to_rational
 from quasilpv.lmi.exact import Matrix, symmetric_part
-from quasilpv.studies.eigenvalue_bounds import Bound, SinePencil, largest_eigenvalue
+from quasilpv.studies.eigenvalue_bounds import Bound, TrigonometricPencil, largest_eigenvalue, prove_below
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.systems.intervals import enclose
 from quasilpv.systems.mechanism import PlanarMechanism
@@ -109,6 +109,35 @@ class VelocityClasses:
         friction = Fraction(max(self.mechanism.friction_nm_s)) / 2
         return Bound(self.lipschitz.proved / 2 + float(friction), max(ratios), self.lipschitz.cells)
 
+    @cached_property
+    def energy(self) -> Bound:
+        """Lipschitz in the norm of the kinetic energy, for the acceleration ``a = M^-1 f``, 1/s.
+
+        gamma with ``|a - a^|_M <= gamma |omega - omega^|_M``, ``|v|_M^2 = v'M(theta) v``: ``[M, J'/gamma; ., M] > 0``.
+        """
+        attained = max(self._energy_ratio(corner.astype(float)) for corner in self._corners())
+        proved = attained * (1.0 + self.tolerance)
+        S, D = to_rational(self.mechanism.absolute_map), to_rational(self.mechanism.inertia_constants)
+        mass = [self._one_pair(k, j, D[k, j], D[k, j]) for k, j in self._pairs]
+        cells = 0
+        for omega in self._corners():
+            constant, terms = self._terms(omega)
+            fixed = _norm_form(constant / Fraction(proved)) - _twice(S.T @ np.diag(np.diag(D)) @ S)
+            slopes = [_norm_form(term / Fraction(proved)) for term in terms]
+            pencil = TrigonometricPencil(fixed, slopes, self._sums, [-_twice(X) for X in mass])
+            cells += prove_below(pencil, 0.0, self.domain.angle_rad)
+        return Bound(proved, attained, cells)
+
+    def _energy_ratio(self, omega: FloatArray) -> float:
+        """Largest ``|L^-1 J L^-T|``, ``M = L L'``, over a grid of angles."""
+        grid = np.meshgrid(*(np.linspace(*interval, 15) for interval in self.domain.angle_rad), indexing="ij")
+        largest = 0.0
+        for theta in np.stack(grid, axis=-1).reshape(-1, self.mechanism.joints):
+            factor = np.linalg.cholesky(self.mechanism.inertia(theta))
+            half = np.linalg.solve(factor, self.jacobian(theta, omega))
+            largest = max(largest, float(np.linalg.norm(np.linalg.solve(factor, half.T), 2)))
+        return largest
+
     # ---- as pencils ------------------------------------------------------------------------------------------------
 
     @cached_property
@@ -130,12 +159,15 @@ class VelocityClasses:
         """
         S, D = to_rational(self.mechanism.absolute_map), to_rational(self.mechanism.inertia_constants)
         W = S @ omega
-        terms = []
-        for k, j in self._pairs:
-            term = to_rational(np.zeros(D.shape))
-            term[k, j], term[j, k] = 2 * D[k, j] * W[j], -2 * D[k, j] * W[k]
-            terms.append(S.T @ term @ S)
+        terms = [self._one_pair(k, j, 2 * D[k, j] * W[j], -2 * D[k, j] * W[k]) for k, j in self._pairs]
         return -to_rational(np.diag(self.mechanism.friction_nm_s)), terms
+
+    def _one_pair(self, k: int, j: int, upper: Fraction, lower: Fraction) -> Matrix:
+        """In joint angles, the matrix that in absolute angles has two entries: (k, j) and (j, k)."""
+        S = to_rational(self.mechanism.absolute_map)
+        entries = 0 * S
+        entries[k, j], entries[j, k] = upper, lower
+        return np.asarray(S.T @ entries @ S)
 
     def _corners(self) -> Iterator[Matrix]:
         for corner in product(*self.domain.speed_rad_s):
@@ -148,7 +180,7 @@ class VelocityClasses:
             constant, terms = self._terms(omega)
             origin = form(0 * constant)
             slopes = [form(term) - origin for term in terms]
-            pencils.append(SinePencil(form(constant), slopes, self._sums))
+            pencils.append(TrigonometricPencil(form(constant), slopes, self._sums))
         return largest_eigenvalue(pencils, self.domain.angle_rad, self.tolerance)
 
 
@@ -160,3 +192,8 @@ def _symmetric_form(J: Matrix) -> Matrix:
 def _norm_form(J: Matrix) -> Matrix:
     """``[0 J'; J 0]``: its largest eigenvalue is the largest singular value of J."""
     return np.block([[0 * J, J.T], [J, 0 * J]])
+
+
+def _twice(M: Matrix) -> Matrix:
+    """``diag(M, M)``."""
+    return np.block([[M, 0 * M], [0 * M, M]])
