@@ -192,7 +192,10 @@ const std::vector<BrokenRule> kBrokenRules{
     {"/sensors/encoder_bits", 3.7, "sensors.encoder_bits"},
     {"/sensors/velocity_noise_rad_s", -0.1, "sensors.velocity_noise_rad_s"},
     {"/sensors/seed", -1, "sensors.seed"},
+    {"/sensors/velocity_filter_time_constant_s", -1e-3, "sensors.velocity_filter_time_constant_s"},
     {"/transport_delay_s", -1e-3, "transport_delay_s"},
+    {"/torque_limit_nm", Json::array({1.0}), "torque_limit_nm"},
+    {"/torque_limit_nm", Json::array({1.0, 0.0}), "torque_limit_nm[1]"},
     {"/initial/angle_rad", Json::array({0.1}), "initial.angle_rad"},
     {"/initial/speed_rad_s", Json::array({0.1, 0.2, 0.3}), "initial.speed_rad_s"},
     {"/initial/speed_rad_s/1", "fast", "initial.speed_rad_s[1]"},
@@ -213,6 +216,19 @@ const std::vector<BrokenRule> kBrokenRules{
 };
 
 INSTANTIATE_TEST_SUITE_P(OneRuleAtATime, BrokenScenario, ::testing::ValuesIn(kBrokenRules));
+
+TEST(Scenario, when_optional_members_are_absent_or_null_expect_no_filter_and_no_limit) {
+  Json document = valid_document();
+  const auto read = [&document] { return Scenario::parse(document.dump(), "swing.json"); };
+  EXPECT_EQ(read().sensors.velocity_filter_time_constant_s, 0.0);
+  EXPECT_FALSE(read().torque_limit_nm);
+  document["torque_limit_nm"] = nullptr;
+  EXPECT_FALSE(read().torque_limit_nm);
+  document["torque_limit_nm"] = {20.0, 10.0};
+  document["sensors"]["velocity_filter_time_constant_s"] = 2e-3;
+  EXPECT_EQ(read().torque_limit_nm, (JointArray{20.0, 10.0}));
+  EXPECT_EQ(read().sensors.velocity_filter_time_constant_s, 2e-3);
+}
 
 TEST(Scenario, when_any_member_is_missing_expect_refusal_naming_it) {
   for (const Json& complete : {valid_document(), five_bar_document(), spring_disc_document()}) {

@@ -14,11 +14,12 @@ namespace {
 using testing::Uniform;
 
 constexpr double kTwoPi = 6.283185307179586;
+constexpr double kPeriod = 1e-3;
 
 class EncoderOfBits : public ::testing::TestWithParam<int> {};
 
 TEST_P(EncoderOfBits, reads_the_nearest_multiple_of_its_quantum) {
-  Sensors sensors({GetParam(), 0.0, 0}, 1);
+  Sensors sensors({GetParam(), 0.0, 0}, 1, kPeriod);
   const double quantum = kTwoPi / std::pow(2.0, GetParam());
   EXPECT_DOUBLE_EQ(sensors.angle_quantum_rad(), quantum);
   Uniform uniform(11);
@@ -37,7 +38,7 @@ TEST_P(EncoderOfBits, reads_the_nearest_multiple_of_its_quantum) {
 INSTANTIATE_TEST_SUITE_P(CommonResolutions, EncoderOfBits, ::testing::Values(1, 8, 12, 17, 20));
 
 TEST(Sensors, when_bits_and_noise_are_zero_expect_the_truth_to_the_bit) {
-  Sensors sensors({0, 0.0, 5}, 3);
+  Sensors sensors({0, 0.0, 5}, 3, kPeriod);
   const JointArray angle{0.1, -1.0 / 3.0, 1e-9};
   const JointArray speed{-0.2, 2.0 / 3.0, 1e9};
   const Measurement measurement = sensors.measure(42, angle, speed);
@@ -54,20 +55,28 @@ TEST(Sensors, quantisation_is_odd_and_rounds_ties_away_from_zero) {
 }
 
 TEST(Sensors, entries_past_the_joints_stay_zero) {
-  Sensors sensors({0, 1.0, 5}, 2);
+  Sensors sensors({0, 1.0, 5}, 2, kPeriod);
   const Measurement measurement = sensors.measure(0, {1.0, 1.0, 1.0}, {1.0, 1.0, 1.0});
   EXPECT_EQ(measurement.angle[2], 0.0);
   EXPECT_EQ(measurement.speed[2], 0.0);
 }
 
 TEST(Sensors, noise_is_on_the_speed_only_and_the_same_for_the_same_seed) {
-  Sensors first({0, 0.05, 7}, 3), second({0, 0.05, 7}, 3), other({0, 0.05, 8}, 3);
+  Sensors first({0, 0.05, 7}, 3, kPeriod), second({0, 0.05, 7}, 3, kPeriod), other({0, 0.05, 8}, 3, kPeriod);
   for (int k = 0; k < 100; ++k) {
     const JointArray angle{0.1, 0.2, 0.3};
     const Measurement measurement = first.measure(k, angle, {});
     EXPECT_EQ(measurement.angle, angle);
     EXPECT_EQ(measurement.speed, second.measure(k, angle, {}).speed);
     EXPECT_NE(measurement.speed, other.measure(k, angle, {}).speed);
+  }
+}
+
+TEST(Sensors, a_filtered_speed_starts_at_the_first_and_forgets_a_step_exponentially) {
+  Sensors sensors({0, 0.0, 0, 4e-3}, 1, kPeriod);
+  EXPECT_EQ(sensors.measure(0, {}, {2.0}).speed[0], 2.0);
+  for (int k = 1; k <= 20; ++k) {
+    EXPECT_NEAR(sensors.measure(k, {}, {3.0}).speed[0], 3.0 - std::exp(-k * kPeriod / 4e-3), 1e-14);
   }
 }
 

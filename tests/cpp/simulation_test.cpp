@@ -106,6 +106,17 @@ TEST_P(TransportDelay, the_old_torque_acts_until_the_delay_has_passed) {
 
 INSTANTIATE_TEST_SUITE_P(UpToOneSample, TransportDelay, ::testing::Values(0.0, 2.5e-4, 5e-4, 1e-3));
 
+TEST(PlantSession, of_a_torque_beyond_the_actuators_their_limit_acts) {
+  Scenario scenario = free_rotor();
+  scenario.torque_limit_nm = JointArray{1.5};
+  PlantSession session(scenario, kSamplePeriod);
+  session.advance(0, {2.0});
+  EXPECT_NEAR(session.truth().speed[0], 1.5 * kSamplePeriod, 1e-15);
+  session.advance(1, {-7.0});
+  EXPECT_NEAR(session.truth().speed[0], 0.0, 1e-15);
+  EXPECT_EQ(session.torque()[0], -1.5);
+}
+
 TEST(PlantSession, a_delay_within_nanoseconds_of_a_sample_boundary_does_not_trouble_ida) {
   for (const double sliver : {1e-18, 5e-10, 2e-9, 1e-7}) {
     Scenario scenario = free_rotor();

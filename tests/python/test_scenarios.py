@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 from quasilpv import _runtime
+from quasilpv.artifact.canonical import canonical_json
 from quasilpv.errors import InputError
+from quasilpv.release import release
 from quasilpv.scenarios import (
+    OPTIONAL,
     FiveBarPlant,
     IdaIntegrator,
     LinkParameters,
@@ -194,7 +197,54 @@ def test_when_another_plant_breaks_a_rule_expect_its_field_in_both_languages(
 def test_when_a_scenario_is_written_expect_exactly_the_members_the_format_documents() -> None:
     table = FORMATS.read_text().split("## Scenario")[1]
     documented = set(re.findall(r"^\| `(\w+)` \|", table, flags=re.MULTILINE))
-    assert set(build_scenario(ARM3, SQUARE).to_document()) == documented | {"schema", "schema_version"}
+    everything = build_scenario(ARM3, SQUARE, torque_limit_nm=(10.0, 10.0, 10.0)).to_document()
+    assert set(everything) == documented | {"schema", "schema_version"}
+    assert (
+        set(everything) - set(build_scenario(ARM3, SQUARE).to_document())
+        == {"torque_limit_nm"}
+        == OPTIONAL - {"sensors.velocity_filter_time_constant_s"}
+    )
+
+
+def run_with(scenario: Scenario) -> dict[str, np.ndarray]:
+    """The first 0.1 s in closed loop with the printed PID gains."""
+    artifact, short = release("arm3", "pid").artifact, {**scenario.to_document(), "duration_s": 0.1}
+    return _runtime.run_closed_loop(
+        _runtime.Artifact.parse(canonical_json(artifact.to_document())),
+        _runtime.Trajectory.parse(canonical_json(SQUARE.to_document())),
+        _runtime.Scenario.parse(json.dumps(short).encode()),
+    )
+
+
+def test_when_the_actuators_are_weaker_than_the_controller_believes_expect_the_plant_to_feel_their_limits() -> None:
+    """Acceleration times true inertia is the delivered torque less gravity and Coriolis torque."""
+    limit, arm = np.array([60.0, 40.0, 5.0]), ARM3.model
+    exact = Sensors(encoder_bits=0, velocity_noise_rad_s=0.0)
+    scenario = build_scenario(
+        ARM3, SQUARE, plant="nominal", sensors=exact, external_torque=(), torque_limit_nm=tuple(limit.tolist())
+    )
+    columns = run_with(scenario)
+    commanded = columns["torque_applied_nm"]
+    assert np.any(np.abs(commanded) > limit)
+    for k in range(1, len(commanded)):
+        angle, speed, acceleration = (
+            columns[f"{name}"][k] for name in ("angle_rad", "speed_rad_s", "acceleration_rad_s2")
+        )
+        delivered = arm.inverse_dynamics(angle, speed, acceleration)
+        np.testing.assert_allclose(delivered, np.clip(commanded[k - 1], -limit, limit), atol=1e-6)
+
+
+def test_when_the_sensor_filters_speeds_expect_the_recursion_of_the_format() -> None:
+    noiseless = {"encoder_bits": 0, "velocity_noise_rad_s": 0.0}
+    scenario = build_scenario(
+        ARM3, SQUARE, sensors=Sensors(**noiseless, velocity_filter_time_constant_s=5e-3), external_torque=()
+    )
+    columns = run_with(scenario)
+    true, measured, q = columns["speed_rad_s"], columns["measured_speed_rad_s"], np.exp(-1e-3 / 5e-3)
+    expected = true[0]
+    for k, speed in enumerate(true):
+        expected = speed if k == 0 else q * expected + (1.0 - q) * speed
+        np.testing.assert_allclose(measured[k], expected, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -216,6 +266,12 @@ def test_when_a_scenario_is_written_expect_exactly_the_members_the_format_docume
         (lambda d: d["external_torque"][0].update(amplitude_nm="450"), "external_torque[0].amplitude_nm"),
         (lambda d: d["sensors"].update(encoder_bits=33), "sensors.encoder_bits"),
         (lambda d: d["sensors"].update(seed=-1), "sensors.seed"),
+        (
+            lambda d: d["sensors"].update(velocity_filter_time_constant_s=-1),
+            "sensors.velocity_filter_time_constant_s",
+        ),
+        (lambda d: d.update(torque_limit_nm=[1, 1]), "torque_limit_nm"),
+        (lambda d: d.update(torque_limit_nm=[1, 1, 0]), "torque_limit_nm[2]"),
         (lambda d: d.update(transport_delay_s=-1e-3), "transport_delay_s"),
         (lambda d: d["initial"].update(angle_rad=[0, 0]), "initial.angle_rad"),
         (lambda d: d["initial"].pop("speed_rad_s"), "initial.speed_rad_s"),

@@ -33,9 +33,10 @@ std::int64_t count_samples(const Scenario& scenario, double sample_period_s) {
 
 PlantSession::PlantSession(const Scenario& scenario, double sample_period_s)
     : plant_(scenario.make_plant()),
-      sensors_(scenario.sensors, plant_->joints()),
+      sensors_(scenario.sensors, plant_->joints(), sample_period_s),
       sample_period_s_(sample_period_s),
       transport_delay_s_(scenario.transport_delay_s),
+      torque_limit_nm_(scenario.torque_limit_nm),
       samples_(count_samples(scenario, sample_period_s)),
       state_(plant_->initial_state(scenario.initial_angle, scenario.initial_speed)) {
   integrator_ = make_integrator(scenario.integrator, *plant_, sample_period_s);
@@ -59,8 +60,18 @@ const Measurement& PlantSession::measure(std::int64_t k) const {
   return measurement_;
 }
 
-void PlantSession::advance(std::int64_t k, const JointArray& torque, double delay_s) {
+JointArray PlantSession::delivered(JointArray torque) const noexcept {
+  if (torque_limit_nm_) {
+    for (std::size_t j = 0; j < torque.size(); ++j) {
+      torque[j] = std::clamp(torque[j], -(*torque_limit_nm_)[j], (*torque_limit_nm_)[j]);
+    }
+  }
+  return torque;
+}
+
+void PlantSession::advance(std::int64_t k, const JointArray& commanded, double delay_s) {
   expect_current(k);
+  const JointArray torque = delivered(commanded);
   const double start = static_cast<double>(k) * sample_period_s_;
   const double end = static_cast<double>(k + 1) * sample_period_s_;
   const double jump = std::clamp(start + delay_s, start, end);

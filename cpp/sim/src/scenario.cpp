@@ -49,12 +49,27 @@ std::vector<SineTorque> external_torque(const Field& field, int joints) {
 }
 
 SensorOptions sensors(const Field& field) {
-  field.only({"encoder_bits", "velocity_noise_rad_s", "seed"});
+  field.only({"encoder_bits", "velocity_noise_rad_s", "seed", "velocity_filter_time_constant_s"});
   SensorOptions options;
   options.encoder_bits = static_cast<int>(field["encoder_bits"].integer(0, kMaxEncoderBits));
   options.velocity_noise_rad_s = field["velocity_noise_rad_s"].non_negative();
   options.seed = static_cast<std::uint64_t>(field["seed"].integer(0, kMaxSeed));
+  if (field.has("velocity_filter_time_constant_s")) {
+    options.velocity_filter_time_constant_s = field["velocity_filter_time_constant_s"].non_negative();
+  }
   return options;
+}
+
+std::optional<JointArray> torque_limit(const Field& root, int joints) {
+  if (!root.has("torque_limit_nm") || root["torque_limit_nm"].is_null()) {
+    return std::nullopt;
+  }
+  const Field field = root["torque_limit_nm"];
+  const JointArray limit = joint_array(field, joints);
+  for (std::size_t j = 0; j < field.size(); ++j) {
+    static_cast<void>(field.at(j).positive());
+  }
+  return limit;
 }
 
 }  // namespace
@@ -65,7 +80,7 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
   const Json document = parse_strict_json(bytes, source);
   const Field root(document, source, "");
   root.only({"schema", "schema_version", "name", "duration_s", "plant", "integrator", "external_torque", "sensors",
-             "transport_delay_s", "initial"});
+             "transport_delay_s", "torque_limit_nm", "initial"});
   root["schema"].expect_text("quasilpv.scenario");
   static_cast<void>(root["schema_version"].integer(1, 1));
   Scenario scenario;
@@ -80,6 +95,7 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
   scenario.external_torque = quasilpv::external_torque(root["external_torque"], n);
   scenario.sensors = quasilpv::sensors(root["sensors"]);
   scenario.transport_delay_s = root["transport_delay_s"].non_negative();
+  scenario.torque_limit_nm = torque_limit(root, n);
   const Field initial = root["initial"];
   initial.only({"angle_rad", "speed_rad_s"});
   scenario.initial_angle = joint_array(initial["angle_rad"], n);

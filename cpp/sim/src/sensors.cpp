@@ -27,10 +27,13 @@ double GaussianNoise::operator()() {
   return radius * std::cos(phase);
 }
 
-Sensors::Sensors(const SensorOptions& options, int joints)
+Sensors::Sensors(const SensorOptions& options, int joints, double sample_period_s)
     : joints_(joints),
       quantum_(options.encoder_bits > 0 ? std::ldexp(kTwoPi, -options.encoder_bits) : 0.0),
       velocity_noise_(options.velocity_noise_rad_s),
+      filter_pole_(options.velocity_filter_time_constant_s > 0.0
+                       ? std::exp(-sample_period_s / options.velocity_filter_time_constant_s)
+                       : 0.0),
       noise_(options.seed) {}
 
 Measurement Sensors::measure(std::int64_t seq, const JointArray& angle, const JointArray& speed) {
@@ -38,8 +41,11 @@ Measurement Sensors::measure(std::int64_t seq, const JointArray& angle, const Jo
   measurement.seq = seq;
   for (std::size_t j = 0; j < static_cast<std::size_t>(joints_); ++j) {
     measurement.angle[j] = quantise(angle[j], quantum_);
-    measurement.speed[j] = velocity_noise_ > 0.0 ? speed[j] + velocity_noise_ * noise_() : speed[j];
+    const double noisy = velocity_noise_ > 0.0 ? speed[j] + velocity_noise_ * noise_() : speed[j];
+    filtered_speed_[j] = started_ ? filter_pole_ * filtered_speed_[j] + (1.0 - filter_pole_) * noisy : noisy;
+    measurement.speed[j] = filtered_speed_[j];
   }
+  started_ = true;
   return measurement;
 }
 

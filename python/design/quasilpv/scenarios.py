@@ -141,11 +141,12 @@ class SineTorque(StrictModel):
 
 
 class Sensors(StrictModel):
-    """Encoder resolution (0 bits: exact), standard deviation of the speed noise, and its seed."""
+    """Encoder resolution (0 bits: exact), standard deviation of the speed noise, its seed, and the filter behind it."""
 
     encoder_bits: int = Field(default=ENCODER_BITS, ge=0, le=32)
     velocity_noise_rad_s: NonNegative = VELOCITY_NOISE_RAD_S
     seed: int = Field(default=NOISE_SEED, ge=0, le=MAX_SAFE_INTEGER)
+    velocity_filter_time_constant_s: NonNegative = 0.0
 
 
 class InitialState(StrictModel):
@@ -160,6 +161,10 @@ Integrator = Annotated[IdaIntegrator | Rk4Integrator, Field(discriminator="kind"
 
 TAGS = ("serial-arm", "five-bar", "spring-disc", "ida", "rk4")
 """The kinds that tell the cases of a union apart."""
+
+
+OPTIONAL = frozenset({"torque_limit_nm", "sensors.velocity_filter_time_constant_s"})
+"""Members a scenario file may leave out, as files written before they were there do."""
 
 
 def sine_torques(*terms: tuple[float, float]) -> tuple[SineTorque, ...]:
@@ -186,11 +191,14 @@ class Scenario(StrictModel):
     external_torque: Annotated[tuple[SineTorque, ...], Field(max_length=1000)]
     sensors: Sensors
     transport_delay_s: NonNegative
+    torque_limit_nm: tuple[Positive, ...] | None = None
     initial: InitialState
 
     @model_validator(mode="after")
     def _check_joints(self) -> Self:
         joints = self.plant.joints
+        if self.torque_limit_nm is not None and len(self.torque_limit_nm) != joints:
+            raise FieldError("torque_limit_nm", f"{len(self.torque_limit_nm)} entries", str(joints))
         for field in ("angle_rad", "speed_rad_s"):
             if len(getattr(self.initial, field)) != joints:
                 raise FieldError(f"initial.{field}", f"{len(getattr(self.initial, field))} entries", str(joints))
@@ -200,13 +208,17 @@ class Scenario(StrictModel):
         return self
 
     def to_document(self) -> Document:
-        """Return the scenario as a normalised JSON tree."""
+        """Return the scenario as a normalised JSON tree; members of `OPTIONAL` that say nothing are left out."""
         document: Document = normalise(self.model_dump(mode="json", by_alias=True), self.name)
+        if self.torque_limit_nm is None:
+            del document["torque_limit_nm"]
+        if not self.sensors.velocity_filter_time_constant_s:
+            del document["sensors"]["velocity_filter_time_constant_s"]
         return document
 
     @classmethod
     def from_document(cls, document: Mapping[str, object], source: str = "scenario") -> Scenario:
-        """Return the scenario of a JSON tree, in which every member must be present, those with a default too.
+        """Return the scenario of a JSON tree, in which all members but `OPTIONAL` are present, defaults too.
 
         Raises:
             InputError: a rule of the format is broken; the message names the field.
@@ -310,6 +322,7 @@ def build_scenario(
     transport_delay_s: float = 0.0,
     initial_angle_rad: Vector | None = None,
     initial_speed_rad_s: Vector | None = None,
+    torque_limit_nm: Vector | None = None,
 ) -> Scenario:
     """Return the experiment in which ``robot`` tracks ``trajectory``.
 
@@ -324,6 +337,7 @@ def build_scenario(
         transport_delay_s: time from a sample to the moment its torque acts.
         initial_angle_rad: start at these angles; default: on the reference, moving with it.
         initial_speed_rad_s: start there with these speeds; default: at rest.
+        torque_limit_nm: largest torques the actuators deliver, whatever is commanded; default: no limit.
 
     Raises:
         InputError: robot and trajectory do not fit, or a value is out of range.
@@ -346,6 +360,7 @@ def build_scenario(
         "external_torque": [term.model_dump(mode="json") for term in external_torque],
         "sensors": (sensors or Sensors()).model_dump(mode="json"),
         "transport_delay_s": transport_delay_s,
+        "torque_limit_nm": None if torque_limit_nm is None else list(torque_limit_nm),
         "initial": initial,
     }
     return Scenario.from_document(document, trajectory.name)

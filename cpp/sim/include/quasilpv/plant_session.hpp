@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "quasilpv/integrator.hpp"
 #include "quasilpv/plant.hpp"
@@ -19,7 +20,8 @@ namespace quasilpv {
 /// Sample k lives on [t_k, t_{k+1}], t_k = k T: `measure(k)`, then `advance(k, torque_k)`. The torque of the sample
 /// before acts on [t_k, t_k + delay], torque_k on [t_k + delay, t_{k+1}] (no torque acts before the first). The
 /// integrator restarts at each of these jumps. A delay within 1 ns of 0 or of T counts as 0 or T: a shorter interval
-/// cannot be told from a jump. RT-UNSAFE throughout.
+/// cannot be told from a jump. Of every torque the actuators deliver what the scenario's limits let through. RT-UNSAFE
+/// throughout.
 class PlantSession {
  public:
   /// INIT-ONLY. Throws InputError if `sample_period_s` is not positive, the duration is less than half a sample, or the
@@ -46,17 +48,19 @@ class PlantSession {
   void advance(std::int64_t k, const JointArray& torque) { advance(k, torque, transport_delay_s_); }
 
   /// The same with the delay this command really had, clamped to [0, T] (real time).
-  void advance(std::int64_t k, const JointArray& torque, double delay_s);
+  void advance(std::int64_t k, const JointArray& commanded, double delay_s);
 
  private:
   void expect_current(std::int64_t k) const;
   void observe(double time_s);
+  JointArray delivered(JointArray torque) const noexcept;
 
   std::unique_ptr<Plant> plant_;
   std::unique_ptr<Integrator> integrator_;
   Sensors sensors_;
   double sample_period_s_;
   double transport_delay_s_;
+  std::optional<JointArray> torque_limit_nm_;
   std::int64_t samples_;
   std::int64_t seq_ = 0;
   Eigen::VectorXd state_;

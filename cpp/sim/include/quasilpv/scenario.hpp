@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,7 +24,8 @@ struct Scenario {
   IntegratorOptions integrator;
   std::vector<SineTorque> external_torque;
   SensorOptions sensors;
-  double transport_delay_s = 0.0;  ///< torque k acts from t_k + delay; at most one sample period
+  double transport_delay_s = 0.0;             ///< torque k acts from t_k + delay; at most one sample period
+  std::optional<JointArray> torque_limit_nm;  ///< what the actuators deliver of any command, > 0; none: all of it
   JointArray initial_angle{};
   JointArray initial_speed{};
 

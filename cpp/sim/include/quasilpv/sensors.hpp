@@ -13,6 +13,7 @@ struct SensorOptions {
   int encoder_bits = 0;               ///< 0: exact angles; else the angle is a multiple of 2 pi / 2^bits
   double velocity_noise_rad_s = 0.0;  ///< standard deviation of the white noise on the measured speed
   std::uint64_t seed = 0;
+  double velocity_filter_time_constant_s = 0.0;  ///< of the low-pass behind the noise, in the sensor; 0: none
 };
 
 /// Joint angles (rad) and speeds (rad/s) as measured at sample `seq`, plant time seq T.
@@ -41,11 +42,12 @@ class GaussianNoise {
   bool has_spare_ = false;
 };
 
-/// Encoders and noisy speeds of n joints. Every call to measure() draws new noise, so call it once per sample.
+/// Encoders and noisy, filtered speeds of n joints: v = q v + (1 - q) (w + noise), q = exp(-T / time constant), from
+/// the first measured speed on. Every call to measure() draws new noise, so call it once per sample.
 class Sensors {
  public:
   /// INIT-ONLY.
-  Sensors(const SensorOptions& options, int joints);
+  Sensors(const SensorOptions& options, int joints, double sample_period_s);
 
   Measurement measure(std::int64_t seq, const JointArray& angle, const JointArray& speed);
 
@@ -55,7 +57,10 @@ class Sensors {
   int joints_;
   double quantum_;
   double velocity_noise_;
+  double filter_pole_;
   GaussianNoise noise_;
+  JointArray filtered_speed_{};
+  bool started_ = false;
 };
 
 }  // namespace quasilpv
