@@ -23,8 +23,8 @@ cpu_set_t cores_at_start() noexcept {
 const cpu_set_t g_cores_at_start = cores_at_start();
 
 void touch_stack() noexcept {
-  constexpr std::size_t kStackBytes = 256 * 1024;
   constexpr std::size_t kPageBytes = 4096;
+  constexpr std::size_t kStackBytes = 64 * kPageBytes;
   char stack[kStackBytes];
   volatile char* const pages = stack;  // volatile: the writes are the purpose
   for (std::size_t i = 0; i < kStackBytes; i += kPageBytes) {
