@@ -58,7 +58,7 @@ TEST_F(HardwareDriver, is_paced_on_the_grid_and_gets_one_command_per_reading) {
   EXPECT_GE(monotonic_ns() - start_ns, (kSamples - 1) * to_nanoseconds(kSamplePeriod));
   EXPECT_EQ(report.end, ControllerRunEnd::kPlantEnded);
   EXPECT_EQ(report.commands + robot.skipped_ticks(), loop_.last_seq() + 1);
-  EXPECT_EQ(loop_.predicted_steps(), robot.skipped_ticks());
+  EXPECT_LE(loop_.predicted_steps(), robot.skipped_ticks());
   telemetry_v1 sample;
   while (ring_->pop(sample)) {
     for (std::size_t j = 0; j < kJoints; ++j) {
