@@ -20,12 +20,13 @@ from quasilpv.certificate.grid_gate import frozen_hinf_law
 from quasilpv.certificate.hinf_law import unknown_terms
 from quasilpv.conditions.iii10 import tracking_condition
 from quasilpv.conditions.iii10_reduced import UnknownTorques, reduced_tracking_condition
+from quasilpv.errors import InfeasibleError
 from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
 from quasilpv.scenarios import Sensors
 from quasilpv.synthesis import Specification
-from quasilpv.synthesis.hinf_tracking import unknown_torques
+from quasilpv.synthesis.hinf_tracking import hinf_tracking, unknown_torques
 from quasilpv.synthesis.torque_schedule import full_schedule
 from quasilpv.systems.registry import robot
 from reference.mutants import BLOCKS, Mutant
@@ -273,6 +274,22 @@ def test_when_a_design_is_released_expect_its_gate_passed_and_not_called_a_proof
     assert found["worst_growth_rate_per_s"] < 0.0
     fast = changed(lambda document: document["law"].update(velocity_filter_time_constant_s=0.02))
     assert not gate(fast).passed
+
+
+def test_when_the_bound_on_friction_is_that_of_the_robot_expect_a_design_for_the_five_bar() -> None:
+    """With the 10 N m s of the arms, 2500 times its inertia per second, no gain of this size passes the gate."""
+    specification, entry = Specification(rate_hz=RATE_HZ, disturbance_frequency_rad_s=50.0), robot("fivebar")
+    content = release("fivebar", "hinf-tracking", specification).artifact.content()
+    assert content["verification"]["certificate"]["verified"]
+    assert content["verification"]["gate"]["passed"]
+    assert content["witness"]["feedback"]["friction_nm_s"] == entry.friction_bound_nm_s
+    with pytest.raises(InfeasibleError):
+        hinf_tracking(replace(entry, friction_bound_nm_s=10.0), specification)
+
+
+def test_when_the_robot_holds_a_spring_expect_a_refusal() -> None:
+    with pytest.raises(InfeasibleError, match="know gravity, no spring"):
+        hinf_tracking(robot("spring-disc"), Specification(rate_hz=RATE_HZ))
 
 
 @pytest.mark.full

@@ -33,6 +33,7 @@ from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
 from quasilpv.synthesis.torque_schedule import ScheduledPlants, full_schedule
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import Robot
+from quasilpv.systems.rolling_disc import RollingDisc
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -176,9 +177,11 @@ def hinf_tracking(robot: Robot, specification: Specification, progress: Progress
         progress: called with (gain limits done, gain limits in all).
 
     Raises:
-        InfeasibleError: the inequalities have no verified solution, or no point of the search is stable with every
-            payload and delay within the torque activity.
+        InfeasibleError: the robot holds a spring, the inequalities have no verified solution, or no point of the search
+            is stable with every payload and delay within the torque activity.
     """
+    if isinstance(robot.model, RollingDisc):
+        raise InfeasibleError(f"{robot.id}: no hinf-tracking design: the bounds of its terms know gravity, no spring")
     chosen = full_schedule(robot)
     screen = ScheduledPlants.of(robot, chosen, PlantGrid.screen(robot))
     search = _Search(robot, specification, chosen, screen)
