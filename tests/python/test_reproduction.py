@@ -38,6 +38,8 @@ REQUIRED = {
     *(f"table-II.{k}" for k in (1, 2, 3, 4)),
     *(f"table-III.{k}" for k in (1, 2)),
     *(f"table-IV.{k}" for k in (1, 2, 5, 6)),
+    "table-III.3",
+    "study-estimation",
     "study-conservatism",
 }
 """Everything the source shows that is computed, by id."""

@@ -11,6 +11,7 @@ from quasilpv.reproduction import (
     complexity_growth,
     complexity_tables,
     conservatism,
+    estimated_premises,
     lumped_premises,
     nonquadratic,
     overbounding,
@@ -38,6 +39,7 @@ ITEMS: dict[str, Item] = {
         tracking_serial,
         tracking_parallel,
         lumped_premises,
+        estimated_premises,
         complexity_tables,
         conservatism,
     )
