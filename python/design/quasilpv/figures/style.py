@@ -29,8 +29,8 @@ BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
     "#D55E00",
     "#CC79A7",
 )
-PLUM, BROWN, NAVY, PINE = "#A0208F", "#6B4A00", "#12355B", "#004D38"
-"""Dark shades of `PURPLE`, `ORANGE`, `SKY` and `GREEN`, for variants of what these stand for."""
+PLUM, BROWN, NAVY, LIME = "#A0208F", "#6B4A00", "#12355B", "#A6D854"
+"""Shades of `PURPLE`, `ORANGE`, `SKY` and `GREEN`, for variants of what these stand for."""
 JOINT_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 CONTROLLER_COLOURS = {
     "pid": PURPLE,
@@ -41,7 +41,7 @@ CONTROLLER_COLOURS = {
     "ctc-dob-tuned": NAVY,
     "hinf-tracking": VERMILION,
     "dob-torque": GREEN,
-    "dob-moving": PINE,
+    "dob-moving": LIME,
     "dob-acceleration": BLUE,
 }
 REFERENCE_COLOUR = "#8c8c8c"
