@@ -50,9 +50,13 @@ def hil_command(
     rate_hz: RateOption = None,
     encoder_bits: EncoderOption = None,
     plant: PlantOption = "perturbed",
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for run files and records.")] = Path(
-        "out/hil"
-    ),
+    url: Annotated[
+        str | None,
+        typer.Option("--url", help="LCM URL of both, so that others can listen.  [default: a port of its own]"),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for run files, records and logs.")
+    ] = Path("out/hil"),
     json: JsonOption = False,
 ) -> None:
     """Run a scenario with controller and plant as two processes over LCM, and once more in this process.
@@ -89,6 +93,7 @@ def hil_command(
             mode=mode,
             real_time=RealTimeOptions(silence_s, hold_s, priority),
             variant=variant,
+            url=url,
         )
         steps.end()
     if not real_time and over_lcm.fault is None:

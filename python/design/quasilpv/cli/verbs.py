@@ -47,6 +47,7 @@ VERBS: Mapping[str, Verb] = {
     "track": Verb("track", "Scenarios in closed loop: table and figures."),
     "animate": Verb("animate", "Robots in motion, with and without compensation."),
     "hil": Verb("hil", "Controller and plant as two processes over LCM."),
+    "log": Verb("log", "What a run's log holds; figures, replay, MCAP."),
     "solve": Verb("solve", "Whether a condition holds for a system."),
     "boundary": Verb("boundary", "Where a condition stops being feasible."),
     "region": Verb("region", "A map of feasibility over two parameters."),

@@ -23,15 +23,20 @@ from quasilpv.experiments.track import (
     PlantKind,
     RunFiles,
     TrackingExperiment,
+    run_documents,
     run_from_columns,
     summarise,
+    variant_of,
     write_run_files,
 )
 from quasilpv.scenarios import Sensors
+from quasilpv.telemetry import SUFFIX
+from quasilpv.telemetry.recorder import Recorder
 
 Mode: TypeAlias = Literal["lockstep", "realtime"]
 
 CONTROLLER, SIMULATOR = "qlpv-controller", "qlpv-simulator"
+WIRE_LOG_NAME = f"wire{SUFFIX}"
 MULTICAST_GROUP = "239.255.76.67"
 POLL_S = 0.02
 SILENCE_S = 10.0
@@ -94,18 +99,20 @@ def run_over_lcm(
     mode: Mode,
     real_time: RealTimeOptions | None = None,
     variant: Variant | None = None,
+    url: str | None = None,
 ) -> HilResult:
-    """Run controller and plant as two processes on this machine, with a session and a port of their own.
+    """Run controller and plant as two processes on this machine, with a session of their own; log what they say.
 
     Args:
         experiment: what is tracked.
         artifact: the controller.
-        folder: where the run's files and both records are written.
+        folder: where the run's files, both records and the log are written.
         plant: the true plant.
         sensors: encoders and speed noise.
         mode: lock-step (deterministic) or real time.
         real_time: watchdog times and priority, read in real time only.
         variant: what to call the controller, by default its law kind.
+        url: where they talk, by default on a port of their own.
 
     Raises:
         InputError: robot and controller do not fit, an executable is missing, or the folder cannot be written.
@@ -114,11 +121,15 @@ def run_over_lcm(
     """
     files = write_run_files(folder, experiment, artifact, plant=plant, sensors=sensors)
     records = {CONTROLLER: folder / "controller.csv", SIMULATOR: folder / "plant.csv"}
-    commands = _commands(files, records, mode)
+    url = url or f"udpm://{MULTICAST_GROUP}:{49152 + secrets.randbelow(65536 - 49152)}?ttl=0"
+    commands = _commands(files, records, mode, url)
     if mode == "realtime":
         commands = {name: [*command, *(real_time or RealTimeOptions()).of(name)] for name, command in commands.items()}
     limit_s = LOCK_STEP_LIMIT_S if mode == "lockstep" else experiment.trajectory.duration_s + 4 * SILENCE_S
-    reports, fault = _run_both(commands, limit_s)
+    documents = run_documents(mode, files, experiment, artifact, variant or variant_of(artifact, sensors))
+    with Recorder(url, folder / WIRE_LOG_NAME, documents) as recorder:
+        reports, fault = _run_both(commands, limit_s)
+        recorder.add_truth(read_record(records[SIMULATOR], artifact.joints))
     run = merge_records(records[SIMULATOR], records[CONTROLLER], artifact)
     return HilResult(
         mode,
@@ -193,10 +204,9 @@ def find_executable(name: str) -> str:
     return found
 
 
-def _commands(files: RunFiles, records: dict[str, Path], mode: Mode) -> dict[str, list[str]]:
-    port = 49152 + secrets.randbelow(65536 - 49152)
+def _commands(files: RunFiles, records: dict[str, Path], mode: Mode, url: str) -> dict[str, list[str]]:
     common = ["--artifact", str(files.artifact), "--session", str(1 + secrets.randbelow(2**31 - 1))]
-    common += ["--url", f"udpm://{MULTICAST_GROUP}:{port}?ttl=0", "--mode", mode]
+    common += ["--url", url, "--mode", mode]
     common += ["--timeout-s", str(SILENCE_S), "--json"]
     inputs = {CONTROLLER: ["--trajectory", str(files.trajectory)], SIMULATOR: ["--scenario", str(files.scenario)]}
     return {

@@ -17,8 +17,19 @@ from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import FloatArray, Run
-from quasilpv.scenarios import EXTERNAL_TORQUE, Sensors, SineTorque, build_scenario, tracking_task, write_scenario
+from quasilpv.scenarios import (
+    EXTERNAL_TORQUE,
+    Sensors,
+    SineTorque,
+    build_scenario,
+    read_scenario,
+    tracking_task,
+    write_scenario,
+)
+from quasilpv.systems.mechanism import PlanarMechanism
 from quasilpv.systems.registry import Robot, robot
+from quasilpv.telemetry import LOG_NAME, Mode, RunHeader
+from quasilpv.telemetry.recording import RunDocuments, write_run
 from quasilpv.trajectories import Trajectory, plan, read_path, write_trajectory
 
 PlantKind: TypeAlias = Literal["nominal", "perturbed"]
@@ -132,17 +143,19 @@ def track(
     sensors: Sensors,
     transport_delay_s: float = 0.0,
     variant: Variant | None = None,
+    log: bool = True,
 ) -> TrackResult:
     """Run one controller on one experiment in closed loop, in this process.
 
     Args:
         experiment: what is tracked.
         artifact: the controller.
-        folder: where the run's files are written; the run reads them from there.
+        folder: where the run's files and its log are written; the run reads them from there.
         plant: the true plant.
         sensors: encoders and speed noise.
         transport_delay_s: from a sample to the moment its torque acts.
         variant: what to call the controller; by default its law kind, which several controllers share.
+        log: write the log of the run.
 
     Raises:
         InputError: robot and controller do not fit, or the folder cannot be written.
@@ -155,8 +168,25 @@ def track(
     columns = _runtime.run_closed_loop(
         runtime, _runtime.Trajectory.load(str(files.trajectory)), _runtime.Scenario.load(str(files.scenario))
     )
+    variant = variant or variant_of(artifact, sensors)
+    if log:
+        write_run(folder / LOG_NAME, run_documents("in-process", files, experiment, artifact, variant), columns)
     run = run_from_columns(columns, artifact.joints, artifact.sample_period_s)
     return summarise(run, experiment, artifact, plant=plant, sensors=sensors, variant=variant)
+
+
+def run_documents(
+    mode: Mode, files: RunFiles, experiment: TrackingExperiment, artifact: Artifact, variant: Variant
+) -> RunDocuments:
+    """What the log of a run says of it before the first sample.
+
+    Args:
+        mode: how the run was made.
+        files: of the run.
+        experiment, artifact, variant: as those of `track`.
+    """
+    header = RunHeader(mode=mode, controller=variant.controller)
+    return RunDocuments(header, artifact, experiment.trajectory, read_scenario(files.scenario))
 
 
 def run_from_columns(columns: dict[str, FloatArray], joints: int, sample_period_s: float) -> Run:
@@ -199,14 +229,43 @@ def summarise(
     variant: Variant | None = None,
 ) -> TrackResult:
     """The numbers of a run, however it was made; arguments as those of `track`."""
+    return summarise_as(
+        run,
+        experiment.name,
+        experiment.robot.model,
+        artifact,
+        plant=plant,
+        sensors=sensors,
+        variant=variant or variant_of(artifact, sensors),
+    )
+
+
+def summarise_as(
+    run: Run,
+    name: str,
+    mechanism: PlanarMechanism,
+    artifact: Artifact,
+    *,
+    plant: str,
+    sensors: Sensors,
+    variant: Variant,
+) -> TrackResult:
+    """The numbers of a run that is known by its name and its robot only; other arguments as those of `track`.
+
+    Args:
+        run: the record.
+        name: of the experiment.
+        mechanism: what moves the tool; its masses do not matter.
+        artifact, plant, sensors, variant: as those of `track`.
+    """
 
     def tool_position(angle: FloatArray) -> FloatArray:
-        return np.array([experiment.robot.model.forward_kinematics(row)[:2] for row in angle])
+        return np.array([mechanism.forward_kinematics(row)[:2] for row in angle])
 
     runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()), artifact.name)
     return TrackResult(
-        scenario=experiment.name,
-        variant=variant or variant_of(artifact, sensors),
+        scenario=name,
+        variant=variant,
         rate_hz=round(1.0 / artifact.sample_period_s, 6),
         plant=plant,
         velocity_noise_rad_s=sensors.velocity_noise_rad_s,

@@ -1,0 +1,145 @@
+"""``design log``: what is in the log of a run, its figures, its replay, and its conversion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
+from quasilpv.cli.logs import LogArtifactOption, open_log
+from quasilpv.errors import ClaimError, InputError
+from quasilpv.experiments.logged import logged_result
+from quasilpv.figures.gallery import write_gallery
+from quasilpv.telemetry import RunLog
+from quasilpv.telemetry.log import ARTIFACT, HEADER, Messages
+from quasilpv.telemetry.mcap_export import write_mcap
+from quasilpv.telemetry.replay import replay
+
+
+class Action(StrEnum):
+    """What to do with a log."""
+
+    INFO = "info"
+    PLOT = "plot"
+    REPLAY = "replay"
+    TO_MCAP = "to-mcap"
+
+
+def log_command(
+    action: Annotated[Action, typer.Argument(metavar="ACTION", help="info, plot, replay or to-mcap.")],
+    log: Annotated[str, typer.Argument(metavar="LOG", help="A log, or LAST: the newest one under out.")],
+    *,
+    artifact: LogArtifactOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", metavar="PATH", help="plot: folder; to-mcap: file.  [default: beside the log]"),
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Look into the log that every run of design track and design hil writes.
+
+    \b
+    info     channels, counts, rates, what is missing, the artifact's hash
+    plot     the figures of the run, as design track draws them
+    replay   the controller again, in lock-step, on the logged measurements; exit
+             code 1 unless it commands the logged torques, bit for bit
+    to-mcap  a file that Foxglove and PlotJuggler open
+
+    \b
+    Examples:
+      design log info LAST
+      design log to-mcap LAST -o run.mcap
+    """
+    if out is not None and action not in (Action.PLOT, Action.TO_MCAP):
+        raise InputError("command line", "-o", out, f"nothing beside {action.value}, which writes no file")
+    _ACTIONS[action](open_log(log, artifact), out, json)
+
+
+def _info(log: RunLog, _: Path | None, json: bool) -> None:
+    about, channels = _about(log), _channels(log)
+    if json:
+        print_json({**about, "channels": channels, "foreign": dict(log.foreign)})
+        return
+    print_table(log.source, ("", ""), [(name, str(value)) for name, value in about.items() if value is not None], 2)
+    columns = ("channel", "messages", "rate\nHz", "samples", "missing", "repeated", "refused")
+    rows = [(name, *(_cell(entry[key.split("\n")[0]]) for key in columns[1:])) for name, entry in channels.items()]
+    print_table("channels", columns, rows)
+
+
+def _about(log: RunLog) -> dict[str, Any]:
+    telemetry, about = log["telemetry"], {"log": log.source, "duration_s": round(log.duration_s, 6)}
+    if HEADER in log.documents:
+        scenario = log.scenario
+        about |= {"mode": log.header.mode, "scenario": scenario.name, "plant": scenario.plant.label}
+        about |= {"controller": log.header.controller, "trajectory_hash": log.trajectory.hash}
+    if ARTIFACT in log.documents:
+        about |= {"artifact": log.artifact.name, "artifact_hash": log.artifact.hash}
+    sessions = {session for messages in log.channels.values() for session in messages.records["session"].tolist()}
+    about["sessions"] = sorted(sessions)
+    about["telemetry_drops"] = int(telemetry.records["drops"].max(initial=0))
+    return about
+
+
+def _channels(log: RunLog) -> dict[str, dict[str, Any]]:
+    return {
+        name: {
+            "messages": int(messages.records.size),
+            "rate": messages.rate_hz,
+            **_samples(name, messages),
+            "refused": sum(messages.refused.values()),
+            "refused_by_reason": dict(messages.refused),
+        }
+        for name, messages in log.channels.items()
+    }
+
+
+def _samples(name: str, messages: Messages) -> dict[str, int | None]:
+    """How the messages cover the samples; nothing of events, which come when something happens."""
+    if name == "QLPV_EVENT":
+        return {"samples": None, "missing": None, "repeated": None}
+    return {"samples": int(messages.samples.size), "missing": messages.missing, "repeated": messages.repeated}
+
+
+def _cell(value: float | None) -> str:
+    return "-" if value is None else f"{value:g}"
+
+
+def _plot(log: RunLog, out: Path | None, json: bool) -> None:
+    files = write_gallery(logged_result(log), out or Path(log.source).parent)
+    if json:
+        print_json({"figures": [str(path) for path in files]})
+    else:
+        print_note(f"wrote {', '.join(path.name for path in files)} in {files[0].parent}")
+
+
+def _replay(log: RunLog, _: Path | None, json: bool) -> None:
+    shown = replay(log)
+    if json:
+        print_json({"log": log.source, "artifact_hash": log.artifact.hash, **asdict(shown)})
+    if shown.first_difference is not None:
+        raise ClaimError(f"{log.source}: {shown.first_difference}; expected identical torques")
+    if not json:
+        until = "" if shown.fault_seq is None else f", up to the fault at sample {shown.fault_seq}"
+        print(f"{shown.samples} samples replayed, {shown.compared} commands compared: identical, bit for bit{until}")
+
+
+def _to_mcap(log: RunLog, out: Path | None, json: bool) -> None:
+    path = out or Path(log.source).with_suffix(".mcap")
+    count = write_mcap(log, path)
+    if json:
+        print_json({"mcap": str(path), "messages": count})
+    else:
+        print_note(f"wrote {path}: {count} messages")
+
+
+_ACTIONS: Mapping[Action, Callable[[RunLog, Path | None, bool], None]] = {
+    Action.INFO: _info,
+    Action.PLOT: _plot,
+    Action.REPLAY: _replay,
+    Action.TO_MCAP: _to_mcap,
+}

@@ -1,0 +1,36 @@
+"""Logs as verbs take them: a file, or the word LAST."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import typer
+
+from quasilpv.artifact import read_artifact
+from quasilpv.telemetry import RunLog, latest_log, read_log
+from quasilpv.telemetry.log import LAST
+
+LogArtifactOption: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("--artifact", metavar="FILE", help="The controller of the run, to be sure, or if the log holds none."),
+]
+
+
+def log_path(text: str) -> Path:
+    """The file that the command line means.
+
+    Raises:
+        InputError: LAST, and there is no log.
+    """
+    return latest_log() if text == LAST else Path(text)
+
+
+def open_log(text: str, artifact: Path | None) -> RunLog:
+    """The log that the command line means, of a run of this artifact if one is given.
+
+    Raises:
+        InputError: it cannot be read, or it is of a run with another controller.
+    """
+    log = read_log(log_path(text))
+    return log if artifact is None else log.require_artifact(read_artifact(artifact))

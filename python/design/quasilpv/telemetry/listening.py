@@ -1,0 +1,31 @@
+"""Hearing an LCM URL."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import lcm
+
+from quasilpv.errors import InputError, TransportError
+
+DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
+_URL = re.compile(r"udpm://\d+(\.\d+){3}:\d+\?ttl=0")
+
+
+def listen(url: str, hear: Callable[[str, bytes], None]) -> lcm.LCM:
+    """A subscription to every channel of the project; its `handle_timeout` calls ``hear(channel, data)``.
+
+    Raises:
+        InputError: the URL is none of this machine.
+        TransportError: there is no multicast route.
+    """
+    if not _URL.fullmatch(url):
+        raise InputError("command line", "--url", url, f"udpm://ADDRESS:PORT?ttl=0, e.g. {DEFAULT_URL}")
+    try:
+        wire = lcm.LCM(url)
+    except RuntimeError as error:
+        raise TransportError(f"{url}: {error}") from error
+    # LCM drops the newest message of a full queue: this one is never full.
+    wire.subscribe("QLPV_.*", hear).set_queue_capacity(0)
+    return wire

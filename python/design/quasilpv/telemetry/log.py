@@ -1,0 +1,220 @@
+"""The log of one run: its documents, and its messages by channel as arrays.
+
+A log explains itself: before the messages it holds, as JSON, the run's artifact, trajectory, scenario and a header that
+says how it was made. Messages follow the rules of ``docs/reference/messages.md``; those that break one are counted.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from quasilpv.artifact import Artifact
+from quasilpv.artifact.canonical import canonical_json, parse_document, parse_strict_json
+from quasilpv.artifact.strict_model import StrictModel, validate
+from quasilpv.errors import InputError
+from quasilpv.scenarios import Scenario
+from quasilpv.telemetry.event_log import SUFFIX, Event, read_events
+from quasilpv.telemetry.message_types import CHANNELS, MessageType, Records, channel_type
+from quasilpv.trajectories import Trajectory
+
+Mode: TypeAlias = Literal["in-process", "lockstep", "realtime"]
+
+LOG_NAME = f"run{SUFFIX}"
+LAST = "LAST"
+RUNS_FOLDER = Path("out")
+
+HEADER, ARTIFACT, TRAJECTORY, SCENARIO = "QLPV_RUN", "QLPV_ARTIFACT", "QLPV_TRAJECTORY", "QLPV_SCENARIO"
+DOCUMENT_CHANNELS = (HEADER, ARTIFACT, TRAJECTORY, SCENARIO)
+"""Channels of a log that hold one JSON document each; they are never sent."""
+
+
+class RunHeader(StrictModel):
+    """How a run was made.
+
+    Attributes:
+        mode: controller and plant in one process, in two in lock-step, or in two paced by the clock.
+        controller: what the run's controller was called.
+    """
+
+    schema_: Literal["quasilpv.run"] = Field(alias="schema", default="quasilpv.run")
+    schema_version: Literal[1] = 1
+    mode: Mode
+    controller: str
+
+    def to_bytes(self) -> bytes:
+        """The document as a log holds it."""
+        return canonical_json(self.model_dump(mode="json", by_alias=True))
+
+
+def hash_prefix(artifact_hash: str) -> int:
+    """What messages carry of an artifact's hash: its first eight bytes, big endian, as a signed integer."""
+    return int.from_bytes(bytes.fromhex(artifact_hash)[:8], "big", signed=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Messages:
+    """The messages of one channel.
+
+    Attributes:
+        type: of the channel.
+        utime: (N,) microseconds of the log's clock.
+        records: (N,) decoded, in the order of the log.
+        refused: how many packets were no such message, by reason.
+    """
+
+    type: MessageType
+    utime: npt.NDArray[np.int64]
+    records: Records
+    refused: Mapping[str, int]
+
+    @cached_property
+    def samples(self) -> Records:
+        """The first message of every ``seq``, sorted by it."""
+        return self.records[np.unique(self.records["seq"], return_index=True)[1]]
+
+    @property
+    def rate_hz(self) -> float | None:
+        """Messages per second on the clock of the log; None of fewer than two."""
+        span_us = int(self.utime[-1] - self.utime[0]) if self.utime.size > 1 else 0
+        return 1e6 * (self.utime.size - 1) / span_us if span_us > 0 else None
+
+    @property
+    def repeated(self) -> int:
+        """Messages that repeat a ``seq``."""
+        return int(self.records.size - self.samples.size)
+
+    @property
+    def missing(self) -> int:
+        """Values of ``seq`` that are absent between 0 and the largest."""
+        return int(self.samples["seq"][-1] + 1 - self.samples.size) if self.samples.size else 0
+
+
+@dataclass(frozen=True, eq=False)
+class RunLog:
+    """A log, decoded.
+
+    Attributes:
+        source: its file, for messages.
+        documents: JSON bytes of those of `DOCUMENT_CHANNELS` it holds.
+        channels: by name, those of `message_types.CHANNELS`; empty ones too.
+        foreign: how many events there are on every other channel.
+    """
+
+    source: str
+    documents: Mapping[str, bytes]
+    channels: Mapping[str, Messages]
+    foreign: Mapping[str, int] = field(default_factory=dict)
+
+    def __getitem__(self, channel: str) -> Messages:
+        """The messages of a channel, given without its prefix, e.g. ``"telemetry"``."""
+        return self.channels[f"QLPV_{channel.upper()}"]
+
+    @cached_property
+    def header(self) -> RunHeader:
+        """How the run was made. InputError: the log does not say."""
+        return validate(RunHeader, parse_strict_json(self._document(HEADER), self.source), self.source)
+
+    @cached_property
+    def artifact(self) -> Artifact:
+        """The controller. InputError: missing, damaged, or not the one the messages name."""
+        source = f"{self.source}: {ARTIFACT}"
+        artifact = Artifact.from_document(parse_document(self._document(ARTIFACT), source), source)
+        for channel, messages in self.channels.items():
+            others = set(messages.records["artifact_hash"].tolist()) - {hash_prefix(artifact.hash)}
+            if others:
+                got = f"{min(others) & 0xFFFF_FFFF_FFFF_FFFF:016x}..."
+                expected = f"{artifact.hash[:16]}..., {artifact.name}"
+                raise InputError(self.source, f"{channel}.artifact_hash", got, expected)
+        return artifact
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The reference. InputError: missing or damaged."""
+        source = f"{self.source}: {TRAJECTORY}"
+        return Trajectory.from_document(parse_document(self._document(TRAJECTORY), source), source)
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """The experiment. InputError: missing or damaged."""
+        source = f"{self.source}: {SCENARIO}"
+        return Scenario.from_document(parse_strict_json(self._document(SCENARIO), source), source)
+
+    @property
+    def duration_s(self) -> float:
+        """From the first message to the last, on the clock of the log."""
+        times = [messages.utime for messages in self.channels.values() if messages.utime.size]
+        return 1e-6 * (max(int(t[-1]) for t in times) - min(int(t[0]) for t in times)) if times else 0.0
+
+    def require_artifact(self, artifact: Artifact) -> RunLog:
+        """The log, of which it is sure that ``artifact`` was its controller; if it holds none, then it does now.
+
+        Raises:
+            InputError: it was another one.
+        """
+        if ARTIFACT in self.documents and self.artifact.hash != artifact.hash:
+            raise InputError(self.source, "artifact.hash", f"{self.artifact.hash[:16]}...", f"{artifact.hash[:16]}...")
+        document = canonical_json(artifact.to_document())
+        completed = replace(self, documents={**self.documents, ARTIFACT: document})
+        assert completed.artifact.hash == artifact.hash
+        return completed
+
+    def _document(self, channel: str) -> bytes:
+        if channel not in self.documents:
+            raise InputError(self.source, channel, "no such event", "a log written by design track or design hil")
+        return self.documents[channel]
+
+
+def read_log(path: Path | str) -> RunLog:
+    """Read the log of a run.
+
+    Raises:
+        InputError: the file cannot be read, is no LCM log, is truncated, or has no event of this project.
+    """
+    packets: dict[str, list[Event]] = {channel: [] for channel in CHANNELS}
+    documents: dict[str, bytes] = {}
+    foreign: Counter[str] = Counter()
+    for event in read_events(path):
+        if event.channel in packets:
+            packets[event.channel].append(event)
+        elif event.channel in DOCUMENT_CHANNELS:
+            documents.setdefault(event.channel, event.data)
+        else:
+            foreign[event.channel] += 1
+    if not documents and not any(packets.values()):
+        raise InputError(str(path), "channels", ", ".join(foreign) or "none", f"at least one of {', '.join(CHANNELS)}")
+    channels = {channel: _decode(channel_type(channel), events) for channel, events in packets.items()}
+    return RunLog(str(path), documents, channels, dict(foreign))
+
+
+def latest_log(folder: Path = RUNS_FOLDER) -> Path:
+    """The log that was written last anywhere below a folder.
+
+    Raises:
+        InputError: there is none.
+    """
+    logs = list(folder.rglob(f"*{SUFFIX}"))
+    if not logs:
+        raise InputError("command line", LAST, f"no *{SUFFIX} under {folder}", "a run before it, e.g. design track")
+    return max(logs, key=lambda path: path.stat().st_mtime_ns)
+
+
+def _decode(kind: MessageType, events: list[Event]) -> Messages:
+    refused: Counter[str] = Counter()
+    kept: list[Event] = []
+    for event in events:
+        reason = kind.refusal(event.data)
+        if reason is None:
+            kept.append(event)
+        else:
+            refused[reason] += 1
+    utime = np.array([event.utime for event in kept], dtype=np.int64)
+    return Messages(kind, utime, kind.decode([event.data for event in kept]), dict(refused))

@@ -1,0 +1,90 @@
+"""Logs as MCAP files, which Foxglove and PlotJuggler open: messages in JSON, each channel with its JSON schema."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+
+from quasilpv.errors import InputError
+from quasilpv.telemetry.log import ARTIFACT, RunLog
+from quasilpv.telemetry.message_types import MessageType
+
+_HIDDEN = ("fingerprint", "crc")
+_PER_PREMISE = "premise"
+
+
+def write_mcap(log: RunLog, path: Path) -> int:
+    """Write a log as an MCAP file; arrays have one entry per joint, or per premise. Return how many messages it holds.
+
+    The documents of the log are attachments, the hash of the artifact is in the metadata record ``quasilpv``.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    partial = path.with_name(f".{path.name}-partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            count = _write(log, Writer(file, compression=CompressionType.ZSTD))
+        partial.replace(path)
+    except OSError as error:
+        raise InputError(str(path), "file", error.strerror or error, "a writable file") from error
+    finally:
+        partial.unlink(missing_ok=True)
+    return count
+
+
+def _write(log: RunLog, writer: Writer) -> int:
+    writer.start(profile="", library="quasilpv")
+    metadata = {"source": log.source}
+    if ARTIFACT in log.documents:
+        metadata |= {"artifact": log.artifact.name, "artifact_hash": log.artifact.hash}
+    writer.add_metadata("quasilpv", metadata)
+    for name, document in log.documents.items():
+        writer.add_attachment(0, 0, f"{name.removeprefix('QLPV_').lower()}.json", "application/json", document)
+    count = 0
+    for channel, messages in log.channels.items():
+        schema = writer.register_schema(
+            f"quasilpv.{messages.type.name}", "jsonschema", json.dumps(json_schema(messages.type)).encode()
+        )
+        topic = writer.register_channel(f"/{channel.removeprefix('QLPV_').lower()}", "json", schema)
+        for utime, record in zip(messages.utime.tolist(), messages.records, strict=True):
+            data = json.dumps(as_json(messages.type, record), allow_nan=False).encode()
+            writer.add_message(topic, 1000 * utime, data, 1000 * utime, int(record["seq"]) & 0xFFFF_FFFF)
+            count += 1
+    writer.finish()  # type: ignore[no-untyped-call]
+    return count
+
+
+def json_schema(kind: MessageType) -> dict[str, Any]:
+    """The JSON schema of what `as_json` makes of messages of a type."""
+    members: dict[str, Any] = {}
+    for name in _shown(kind):
+        layout = kind.record[name]
+        scalar: dict[str, Any] = {"type": "integer" if layout.base.kind == "i" else ["number", "null"]}
+        members[name] = {"type": "array", "items": scalar} if layout.shape else scalar
+    return {"title": f"quasilpv.{kind.name}", "type": "object", "properties": members}
+
+
+def as_json(kind: MessageType, record: Any) -> dict[str, Any]:
+    """A message as a JSON-able tree; numbers that are not finite, which JSON does not know, are null."""
+    tree: dict[str, Any] = {}
+    for name in _shown(kind):
+        value = np.asarray(record[name]).tolist()
+        if isinstance(value, list) and "joints" in (kind.record.names or ()):
+            value = value[: int(record["premises" if name == _PER_PREMISE else "joints"])]
+        tree[name] = [_finite(entry) for entry in value] if isinstance(value, list) else _finite(value)
+    return tree
+
+
+def _shown(kind: MessageType) -> list[str]:
+    return [name for name in kind.record.names or () if name not in _HIDDEN]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,154 @@
+"""Logs of runs in one process, from their samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from quasilpv import _runtime
+from quasilpv.artifact import Artifact
+from quasilpv.artifact.canonical import canonical_json
+from quasilpv.scenarios import Scenario
+from quasilpv.telemetry.event_log import Event, write_events
+from quasilpv.telemetry.log import ARTIFACT, HEADER, SCENARIO, TRAJECTORY, RunHeader, hash_prefix
+from quasilpv.telemetry.message_types import Records, channel_type
+from quasilpv.trajectories import Trajectory
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+Columns: TypeAlias = Mapping[str, FloatArray]
+"""Quantities of a run by name, (N,) or (N, n), as the run-time side names them in its records."""
+
+CONTROLLER, PLANT = 1, 2
+STARTED, ENDED = 1, 2
+RUNNING = 2
+
+_SAME_NAME = (
+    "reference_angle_rad",
+    "reference_speed_rad_s",
+    "reference_acceleration_rad_s2",
+    "measured_angle_rad",
+    "measured_speed_rad_s",
+    "estimated_angle_rad",
+    "estimated_speed_rad_s",
+    "estimated_disturbance",
+    "filtered_disturbance",
+    "integral_error_rad_s",
+)
+_MEMBERS = {
+    "QLPV_MEASUREMENT": {"angle_rad": "measured_angle_rad", "speed_rad_s": "measured_speed_rad_s"},
+    "QLPV_COMMAND": {"torque_nm": "torque_applied_nm"},
+    "QLPV_TELEMETRY": {name: name for name in _SAME_NAME}
+    | {"commanded_torque_nm": "torque_commanded_nm", "applied_torque_nm": "torque_applied_nm"},
+    "QLPV_TRUTH": {name: name for name in ("angle_rad", "speed_rad_s", "acceleration_rad_s2", "torque_nm")},
+}
+"""Which column each member of a message holds."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunDocuments:
+    """What a log says of its run before the first message.
+
+    Attributes:
+        header: how it was made.
+        artifact: the controller.
+        trajectory: the reference.
+        scenario: the experiment.
+    """
+
+    header: RunHeader
+    artifact: Artifact
+    trajectory: Trajectory
+    scenario: Scenario
+
+    def events(self, utime: int) -> Iterator[Event]:
+        """The documents as events at one time."""
+        yield Event(utime, HEADER, self.header.to_bytes())
+        for channel, document in (
+            (ARTIFACT, self.artifact.to_document()),
+            (TRAJECTORY, self.trajectory.to_document()),
+            (SCENARIO, self.scenario.to_document()),
+        ):
+            yield Event(utime, channel, canonical_json(document))
+
+
+def write_run(path: Path, documents: RunDocuments, columns: Columns) -> Path:
+    """Write the log of a run in this process; its clock is that of the samples, k T, so equal runs give equal files.
+
+    Such a run has no fail-safe and measures no times: its state is always "running", its ``step_ns`` 0.
+
+    Args:
+        path: of the log.
+        documents: of the run.
+        columns: of `_runtime.run_closed_loop`.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    artifact, seq = documents.artifact, np.arange(columns["time_s"].size)
+    known = {**columns, "torque_nm": columns["torque_applied_nm"]}
+    streams = {channel: messages(channel, artifact, seq, known) for channel in _MEMBERS}
+    telemetry = streams["QLPV_TELEMETRY"]
+    for records in (streams["QLPV_COMMAND"], telemetry):
+        records["flags"] = columns["flags"]
+        records["state"] = RUNNING
+    premise = _premises(artifact, columns["measured_angle_rad"])
+    telemetry["premises"] = premise.shape[1]
+    telemetry["premise"][:, : premise.shape[1]] = premise
+    return write_events(path, _in_order(documents, streams))
+
+
+def messages(
+    channel: str, artifact: Artifact, seq: npt.NDArray[np.int64], columns: Columns, *, session: int = 0
+) -> Records:
+    """Messages of a channel, one per sample, with what the columns say of them.
+
+    Args:
+        channel: of those that come once per sample.
+        artifact: the controller.
+        seq: (N,) numbers of the samples.
+        columns: what the messages are about; `QLPV_TRUTH` takes the plant's ``torque_nm``.
+        session: of the run.
+    """
+    records = channel_type(channel).new(seq.size)
+    records["utime"] = np.rint(1e6 * seq * artifact.sample_period_s)
+    records["seq"], records["session"], records["joints"] = seq, session, artifact.joints
+    records["artifact_hash"] = hash_prefix(artifact.hash)
+    for member, column in _MEMBERS[channel].items():
+        records[member][:, : artifact.joints] = columns[column].reshape(seq.size, artifact.joints)
+    return records
+
+
+def _in_order(documents: RunDocuments, streams: Mapping[str, Records]) -> Iterator[Event]:
+    yield from documents.events(0)
+    times = streams["QLPV_TELEMETRY"]["utime"].tolist()
+    for source in (CONTROLLER, PLANT):
+        yield _run_event(documents.artifact, source, STARTED, 0, 0)
+    packets = [channel_type(channel).encode(records) for channel, records in streams.items()]
+    for utime, *sample in zip(times, *packets, strict=True):
+        for channel, packet in zip(streams, sample, strict=True):
+            yield Event(utime, channel, packet)
+    for source in (PLANT, CONTROLLER):
+        yield _run_event(documents.artifact, source, ENDED, times[-1], len(times) - 1)
+
+
+def _run_event(artifact: Artifact, source: int, code: int, utime: int, seq: int) -> Event:
+    kind = channel_type("QLPV_EVENT")
+    records = kind.new(1)
+    members = {"utime": utime, "seq": seq, "artifact_hash": hash_prefix(artifact.hash), "source": source, "code": code}
+    for name, value in members.items():
+        records[name] = value
+    return Event(utime, "QLPV_EVENT", kind.encode(records)[0])
+
+
+def _premises(artifact: Artifact, angle: FloatArray) -> FloatArray:
+    """The premises of every sample as the step reads them: of the measured angles, clamped to their box."""
+    runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()), artifact.name)
+    table = artifact.law.inertia
+    values = np.array([runtime.premises(row) for row in angle.reshape(-1, artifact.joints)])
+    clamped: FloatArray = np.clip(values.reshape(len(values), table.premises), table.lower, table.upper)
+    return clamped

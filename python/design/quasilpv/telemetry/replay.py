@@ -1,0 +1,90 @@
+"""Replay: the controller, fed the measurements of a log in lock-step, commands what the log says it commanded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from quasilpv import _runtime
+from quasilpv.artifact.canonical import canonical_json
+from quasilpv.errors import InputError
+from quasilpv.telemetry.log import RunLog
+
+FAULT = 4
+"""State of a controller that no longer commands what its law says."""
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What a replay showed.
+
+    Attributes:
+        samples: how many steps were taken.
+        compared: on how many of them the log has a command.
+        first_difference: the first sample whose command differs in any bit, in words; None if there is none.
+        fault_seq: the sample at which the logged controller was in fault, where the replay ends; None if it never was.
+    """
+
+    samples: int
+    compared: int
+    first_difference: str | None
+    fault_seq: int | None
+
+
+def replay(log: RunLog) -> Replay:
+    """Step the controller of a log with the logged measurements and compare the torques bit by bit.
+
+    Measurements the log has missed are taken from telemetry, which repeats them.
+
+    Raises:
+        InputError: the log lacks a document or a sample, or was paced by the clock: then torques also depend on which
+            measurements came in time and on the safe torque the controller began with, which no log holds.
+    """
+    if log.header.mode == "realtime":
+        raise InputError(log.source, "mode", "realtime", "in-process or lockstep: only lock-step is replayed")
+    artifact = log.artifact
+    runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()), log.source)
+    trajectory = _runtime.Trajectory.parse(canonical_json(log.trajectory.to_document()), log.source)
+    controller, n = _runtime.Controller(runtime), artifact.joints
+    measured, commands = _measured(log), {int(c["seq"]): c for c in log["command"].samples}
+    compared, difference = 0, None
+    for k, (angle, speed) in enumerate(measured):
+        command = commands.get(k)
+        if command is not None and command["state"] == FAULT:
+            return Replay(k, compared, difference, k)
+        report = controller.step(angle[:n], *trajectory.evaluate(k * artifact.sample_period_s), speed[:n], seq=k)
+        if command is None:
+            continue
+        compared += 1
+        difference = difference or _difference(k, report.torque_applied[:n], command)
+    return Replay(len(measured), compared, difference, None)
+
+
+def _difference(k: int, torque: FloatArray, command: Any) -> str | None:
+    """In words, whether a torque is the commanded one, bit by bit: NaN equals NaN, 0 differs from -0."""
+    logged = np.ascontiguousarray(command["torque_nm"][: torque.size])
+    different = np.flatnonzero(logged.view(np.int64) != np.ascontiguousarray(torque).view(np.int64))
+    if not different.size:
+        return None
+    joint = int(different[0])
+    return f"sample {k}, joint {joint + 1}: {float(logged[joint])!r} N m in the log, {float(torque[joint])!r} replayed"
+
+
+def _measured(log: RunLog) -> list[tuple[FloatArray, FloatArray]]:
+    """Angles and speeds of every sample from 0 to the last."""
+    found = {
+        int(record["seq"]): (record[f"{prefix}angle_rad"], record[f"{prefix}speed_rad_s"])
+        for channel, prefix in (("telemetry", "measured_"), ("measurement", ""))
+        for record in log[channel].samples
+    }
+    if not found:
+        raise InputError(log.source, "measurements", "none", "at least one, in QLPV_MEASUREMENT or QLPV_TELEMETRY")
+    missing = sorted(set(range(max(found) + 1)) - set(found))
+    if missing:
+        raise InputError(log.source, "measurements", f"none of sample {missing[0]}", "every sample from 0 to the last")
+    return [found[k] for k in range(max(found) + 1)]

@@ -1,0 +1,383 @@
+"""Logs of runs: what LCM reads and writes, bit-identical replay, the verbs, and refusal of what is no log."""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal
+
+import lcm
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+from quasilpv.artifact import Artifact, read_artifact, write_artifact
+from quasilpv.cli import run
+from quasilpv.errors import InputError
+from quasilpv.experiments.hil import WIRE_LOG_NAME, run_over_lcm
+from quasilpv.experiments.logged import logged_result, mechanism_of
+from quasilpv.experiments.result import TrackResult
+from quasilpv.experiments.track import TrackingExperiment, track
+from quasilpv.release import release
+from quasilpv.scenarios import Sensors, build_scenario
+from quasilpv.synthesis import Specification
+from quasilpv.systems.registry import robot, robots
+from quasilpv.telemetry import LOG_NAME, Event, RunLog, latest_log, read_events, read_log, write_events
+from quasilpv.telemetry.mcap_export import as_json, json_schema
+from quasilpv.telemetry.message_types import CHANNELS, message_type, parse_definition
+from quasilpv.telemetry.replay import replay
+from quasilpv.trajectories import rest
+from two_processes import executable
+
+pytest_plugins = ["two_processes"]
+
+SAMPLES = 300
+
+
+@pytest.fixture(scope="module")
+def artifact() -> Artifact:
+    return release("arm3", "ctc-dob", Specification()).artifact
+
+
+@pytest.fixture(scope="module")
+def experiment() -> TrackingExperiment:
+    """A quick one: the arm holds a posture against the disturbance."""
+    return TrackingExperiment("hold", robot("arm3"), rest("hold", 3, SAMPLES * 1e-3))
+
+
+@pytest.fixture(scope="module")
+def tracked(
+    artifact: Artifact, experiment: TrackingExperiment, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[TrackResult, Path]:
+    """A run in this process, and its log."""
+    folder = tmp_path_factory.mktemp("log")
+    return track(experiment, artifact, folder, plant="perturbed", sensors=Sensors()), folder / LOG_NAME
+
+
+COMPARED = (
+    ("measurement", ()),
+    ("command", ("state",)),  # a run in one process has no fail-safe
+    ("telemetry", ("state", "step_ns")),
+    ("truth", ()),
+)
+"""Channels of a log, and what on them differs between a run over the wire and one in this process."""
+
+
+def edited(path: Path, target: Path, change: Any) -> Path:
+    """A copy of a log whose events are passed through a function that may return None to drop one."""
+    events = [change(index, event) for index, event in enumerate(read_events(path))]
+    return write_events(target, [event for event in events if event is not None])
+
+
+def resealed(event: Event, **members: Any) -> Event:
+    """The event with other members and a correct checksum."""
+    kind = message_type(CHANNELS[event.channel])
+    records = np.frombuffer(event.data, kind.record).copy()
+    for name, value in members.items():
+        records[name] = value
+    return event._replace(data=kind.encode(records)[0])
+
+
+@pytest.mark.parametrize("name", CHANNELS.values())
+def test_when_a_message_is_encoded_expect_the_bytes_of_the_code_that_lcm_generates(
+    name: str, message_types: ModuleType
+) -> None:
+    kind = message_type(name)
+    generator = np.random.default_rng(0)
+    records = kind.new(1)
+    theirs = getattr(message_types, name)()
+    for member in kind.record.names[1:-1]:
+        layout = kind.record[member]
+        value = generator.integers(-(2**31), 2**31, layout.shape)
+        if layout.base.kind == "f":
+            value = generator.normal(size=layout.shape)
+        records[member] = value
+        setattr(theirs, member, value.tolist())
+    theirs.crc = zlib.crc32(theirs.encode()[:-8])
+    (packet,) = kind.encode(records)
+    assert packet == theirs.encode()
+    (decoded,) = kind.decode([packet])
+    for member in kind.record.names[1:]:
+        assert np.array_equal(decoded[member], getattr(theirs, member))
+
+
+def test_when_a_packet_is_not_exactly_a_message_expect_it_refused() -> None:
+    kind = message_type("command_v1")
+    (packet,) = kind.encode(kind.new(1))
+    assert kind.refusal(packet) is None
+    assert kind.refusal(packet + b"\0") == "wrong size"
+    assert kind.refusal(packet[:-1]) == "wrong size"
+    assert kind.refusal(packet[:40] + b"\x01" + packet[41:]) == "wrong checksum"
+    other = (1).to_bytes(8, "big") + packet[8:-8]
+    assert kind.refusal(other + zlib.crc32(other).to_bytes(8, "big")) == "wrong type"
+
+
+@pytest.mark.parametrize("member", ["string name;", "double values[n];", "other_v1 nested;"])
+def test_when_a_definition_has_members_of_varying_size_expect_it_refused(member: str) -> None:
+    with pytest.raises(ValueError, match="members"):
+        parse_definition(f"struct bad_v1 {{ int64_t utime; {member} }}")
+
+
+def test_when_lcm_itself_reads_a_log_expect_the_same_events(tracked: tuple[TrackResult, Path]) -> None:
+    ours = list(read_events(tracked[1]))
+    theirs = [Event(event.timestamp, event.channel, event.data) for event in lcm.EventLog(str(tracked[1]), "r")]
+    assert ours == theirs
+    assert len(ours) == 4 + 4 + 4 * SAMPLES
+
+
+def test_when_lcm_itself_writes_a_log_expect_it_read(tmp_path: Path) -> None:
+    path = tmp_path / "theirs.lcmlog"
+    log = lcm.EventLog(str(path), "w", overwrite=True)
+    log.write_event(17, "OTHER", b"abc")
+    log.write_event(18, "QLPV_COMMAND", b"no command")
+    log.close()
+    assert list(read_events(path)) == [Event(17, "OTHER", b"abc"), Event(18, "QLPV_COMMAND", b"no command")]
+    decoded = read_log(path)
+    assert decoded.foreign == {"OTHER": 1}
+    assert decoded["command"].refused == {"wrong size": 1}
+
+
+@given(cut=st.integers(1, 199), junk=st.binary(min_size=1, max_size=60))
+def test_when_a_log_is_cut_or_foreign_bytes_follow_expect_one_line_or_whole_events(
+    tmp_path_factory: pytest.TempPathFactory, cut: int, junk: bytes
+) -> None:
+    path = tmp_path_factory.mktemp("cut") / "cut.lcmlog"
+    events = [Event(k, "QLPV_X", bytes(16)) for k in range(4)]
+    content = write_events(path, events).read_bytes()
+    assert len(content) == 200
+    path.write_bytes(content[:cut])
+    if cut % 50:
+        with pytest.raises(InputError, match=rf"event {cut // 50}: got the end of the file"):
+            list(read_events(path))
+    else:
+        assert list(read_events(path)) == events[: cut // 50]
+    path.write_bytes(content + junk)
+    with pytest.raises(InputError, match="event 4"):
+        list(read_events(path))
+
+
+def test_when_a_run_is_read_back_from_its_log_expect_every_sample_and_number(
+    tracked: tuple[TrackResult, Path], artifact: Artifact
+) -> None:
+    result, path = tracked
+    logged = logged_result(read_log(path))
+    assert result.run.first_difference(logged.run) is None
+    assert logged.row() == result.row()
+    assert logged.title == result.title
+    assert read_log(path).artifact == artifact
+
+
+def test_when_a_run_is_repeated_expect_the_same_log_byte_for_byte(
+    tracked: tuple[TrackResult, Path], artifact: Artifact, experiment: TrackingExperiment, tmp_path: Path
+) -> None:
+    track(experiment, artifact, tmp_path, plant="perturbed", sensors=Sensors())
+    assert (tmp_path / LOG_NAME).read_bytes() == tracked[1].read_bytes()
+    track(experiment, artifact, tmp_path / "unlogged", plant="perturbed", sensors=Sensors(), log=False)
+    assert not (tmp_path / "unlogged" / LOG_NAME).exists()
+
+
+@pytest.mark.parametrize(("kind", "payload"), [("nominal", 0.0), ("perturbed", 1.0)])
+@pytest.mark.parametrize("name", [entry.id for entry in robots()])
+def test_when_a_robot_is_rebuilt_from_its_plant_document_expect_the_same_plant(
+    name: str, kind: Literal["nominal", "perturbed"], payload: float
+) -> None:
+    entry = robot(name)
+    plant = entry.with_payload_fraction(payload)
+    scenario = build_scenario(entry, rest("still", plant.joints, 1.0), plant=kind, external_torque=())
+    rebuilt = mechanism_of(scenario.plant)
+    angle = np.linspace(-0.4, 0.7, plant.joints)
+    np.testing.assert_array_equal(rebuilt.skeleton(angle), plant.skeleton(angle))
+    np.testing.assert_allclose(rebuilt.inertia(angle), plant.inertia(angle), rtol=1e-14)
+    np.testing.assert_allclose(rebuilt.gravity(angle), plant.gravity(angle), rtol=1e-14, atol=1e-14)
+
+
+def test_when_a_log_is_replayed_expect_every_command_bit_for_bit(tracked: tuple[TrackResult, Path]) -> None:
+    shown = replay(read_log(tracked[1]))
+    assert (shown.samples, shown.compared, shown.first_difference, shown.fault_seq) == (SAMPLES, SAMPLES, None, None)
+
+
+def test_when_one_bit_of_one_command_is_another_expect_the_replay_to_name_it(
+    tracked: tuple[TrackResult, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def flip(_: int, event: Event) -> Event:
+        if event.channel != "QLPV_COMMAND":
+            return event
+        command = np.frombuffer(event.data, message_type("command_v1").record)[0]
+        torque = command["torque_nm"].astype(float)
+        if command["seq"] != 123:
+            return event
+        torque[1] = np.nextafter(torque[1], np.inf)
+        return resealed(event, torque_nm=torque)
+
+    path = edited(tracked[1], tmp_path / "flipped.lcmlog", flip)
+    difference = replay(read_log(path)).first_difference
+    assert difference is not None
+    assert difference.startswith("sample 123, joint 2: ")
+    assert run(["log", "replay", str(path)]) == 1
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_when_measurements_were_missed_expect_them_from_telemetry_and_without_both_a_line(
+    tracked: tuple[TrackResult, Path], tmp_path: Path
+) -> None:
+    def without(*channels: str) -> RunLog:
+        def drop(_: int, event: Event) -> Event | None:
+            if event.channel not in channels:
+                return event
+            record = np.frombuffer(event.data, message_type(CHANNELS[event.channel]).record)[0]
+            return None if record["seq"] == 40 else event
+
+        return read_log(edited(tracked[1], tmp_path / "missing.lcmlog", drop))
+
+    log = without("QLPV_MEASUREMENT")
+    assert log["measurement"].missing == 1
+    assert replay(log).first_difference is None
+    with pytest.raises(InputError, match="none of sample 40"):
+        replay(without("QLPV_MEASUREMENT", "QLPV_TELEMETRY"))
+
+
+def test_when_the_controller_was_in_fault_expect_the_replay_to_end_there(
+    tracked: tuple[TrackResult, Path], tmp_path: Path
+) -> None:
+    def latch(_: int, event: Event) -> Event:
+        is_late = event.channel == "QLPV_COMMAND" and int.from_bytes(event.data[16:24], "big") >= 50
+        return resealed(event, state=4, torque_nm=0.0) if is_late else event
+
+    shown = replay(read_log(edited(tracked[1], tmp_path / "fault.lcmlog", latch)))
+    assert (shown.samples, shown.compared, shown.first_difference, shown.fault_seq) == (50, 50, None, 50)
+
+
+def test_when_the_artifact_is_another_one_expect_exit_2_and_one_line(
+    tracked: tuple[TrackResult, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other, _ = write_artifact(tmp_path, release("arm3", "pid", Specification()).artifact)
+    assert run(["log", "replay", str(tracked[1]), "--artifact", str(other)]) == 2
+    line = capsys.readouterr().err
+    assert len(line.splitlines()) == 1
+    assert read_artifact(other).hash[:16] in line
+    log = read_log(tracked[1])
+    swapped = replace(log, documents={**log.documents, "QLPV_ARTIFACT": other.read_bytes()})
+    with pytest.raises(InputError, match=r"QLPV_MEASUREMENT\.artifact_hash"):
+        replay(swapped)
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [(b"", "empty"), (b"[project]\nname", "other bytes"), (None, "No such file"), (b"\xed\xa1\xda\x01", "truncated")],
+)
+@pytest.mark.parametrize("action", ["info", "plot", "replay", "to-mcap"])
+def test_when_a_file_is_no_log_expect_exit_2_and_one_line(
+    action: str, content: bytes | None, word: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "file"
+    if content is not None:
+        path.write_bytes(content)
+    assert run(["log", action, str(path)]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert len(captured.err.splitlines()) == 1
+    assert str(path) in captured.err
+    assert word in captured.err
+
+
+def test_when_the_last_log_is_asked_for_expect_the_newest_and_without_one_a_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="LAST"):
+        latest_log(tmp_path)
+    old, new = tmp_path / "a" / "run.lcmlog", tmp_path / "b" / "c" / "run.lcmlog"
+    for age, path in ((1, old), (0, new)):
+        write_events(path, [Event(0, "QLPV_RUN", b"{}")])
+        stamp = path.stat().st_mtime - age
+        os.utime(path, (stamp, stamp))
+    assert latest_log(tmp_path) == new
+
+
+def test_when_a_log_is_inspected_expect_counts_rates_and_the_hash(
+    tracked: tuple[TrackResult, Path], artifact: Artifact, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["log", "info", str(tracked[1]), "--json"]) == 0
+    info = json.loads(capsys.readouterr().out)
+    assert info["artifact_hash"] == artifact.hash
+    assert (info["mode"], info["scenario"], info["telemetry_drops"]) == ("in-process", "hold", 0)
+    telemetry = info["channels"]["QLPV_TELEMETRY"]
+    assert (telemetry["messages"], telemetry["missing"], telemetry["refused"]) == (SAMPLES, 0, 0)
+    assert telemetry["rate"] == pytest.approx(1000.0)
+    assert run(["log", "info", str(tracked[1])]) == 0
+    assert artifact.hash in capsys.readouterr().out
+
+
+def test_when_figures_are_drawn_from_a_log_expect_those_of_the_run(
+    tracked: tuple[TrackResult, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["log", "plot", str(tracked[1]), "-o", str(tmp_path), "--json"]) == 0
+    files = json.loads(capsys.readouterr().out)["figures"]
+    assert {"path.png", "errors.svg", "disturbance.png"} <= {Path(file).name for file in files}
+    assert all(Path(file).stat().st_size > 1000 for file in files)
+
+
+def test_when_a_log_is_converted_expect_an_mcap_file_with_described_messages(
+    tracked: tuple[TrackResult, Path], artifact: Artifact, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    assert run(["log", "to-mcap", str(tracked[1]), "-o", str(path)]) == 0
+    log = read_log(tracked[1])
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        messages = [(schema, channel.topic, message) for schema, channel, message in reader.iter_messages()]
+        attachments = {attachment.name: attachment.data for attachment in reader.iter_attachments()}
+        (metadata,) = reader.iter_metadata()
+    assert metadata.metadata["artifact_hash"] == artifact.hash
+    assert attachments["artifact.json"] == log.documents["QLPV_ARTIFACT"]
+    assert {schema.encoding for schema, _, _ in messages} == {"jsonschema"}
+    trees = [json.loads(message.data) for _, topic, message in messages if topic == "/telemetry"]
+    assert len(trees) == SAMPLES
+    assert [tree["applied_torque_nm"] for tree in trees] == log["telemetry"].records["applied_torque_nm"][
+        :, :3
+    ].tolist()
+    assert len(trees[0]["premise"]) == artifact.law.inertia.premises
+    described = json.loads(next(schema.data for schema, topic, _ in messages if topic == "/telemetry"))["properties"]
+    assert described.keys() == trees[0].keys()
+    times = [message.log_time for _, topic, message in messages if topic == "/telemetry"]
+    assert times == [1_000_000 * k for k in range(SAMPLES)]
+
+
+def test_when_a_number_is_not_finite_expect_null_in_json() -> None:
+    kind = message_type("measurement_v1")
+    (record,) = kind.new(1)
+    record["joints"], record["angle_rad"] = 2, np.nan
+    tree = as_json(kind, record)
+    assert tree["angle_rad"] == [None, None]
+    assert json_schema(kind)["properties"]["angle_rad"]["items"]["type"] == ["number", "null"]
+
+
+def test_when_two_processes_talk_expect_their_traffic_in_the_log_and_a_replay_bit_for_bit(
+    tracked: tuple[TrackResult, Path],
+    artifact: Artifact,
+    experiment: TrackingExperiment,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("PATH", str(Path(executable("qlpv-simulator")).parent), prepend=":")
+    executable("qlpv-controller")
+    run_over_lcm(experiment, artifact, tmp_path, plant="perturbed", sensors=Sensors(), mode="lockstep")
+    heard, made = read_log(tmp_path / WIRE_LOG_NAME), read_log(tracked[1])
+    for channel, own in COMPARED:
+        theirs, ours = heard[channel].samples, made[channel].samples
+        assert heard[channel].missing == 0
+        for name in set(theirs.dtype.names) - {"utime", "session", "crc", *own}:
+            np.testing.assert_array_equal(theirs[name], ours[name], err_msg=f"{channel}.{name}")
+    assert np.all(heard["telemetry"].samples["step_ns"] > 0)
+    assert replay(heard).first_difference is None
+    assert logged_result(heard).run.first_difference(logged_result(made).run) is None
+
+
+def test_when_a_run_was_paced_by_the_clock_expect_no_replay_but_a_line(tracked: tuple[TrackResult, Path]) -> None:
+    log = read_log(tracked[1])
+    header = log.header.model_copy(update={"mode": "realtime"})
+    with pytest.raises(InputError, match="realtime"):
+        replay(replace(log, documents={**log.documents, "QLPV_RUN": header.to_bytes()}))
