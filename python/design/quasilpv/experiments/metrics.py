@@ -38,7 +38,7 @@ class Metrics:
 
 
 def rms_over_samples(values: FloatArray) -> float:
-    """Root over the mean over samples of the sum over joints of squares: sqrt(1/N sum_k |v_k|^2).
+    """Root over the mean over samples of the sum over joints of squares: `sqrt(1/N sum_k |v_k|^2)`.
 
     Args:
         values: (N, n), N >= 1.

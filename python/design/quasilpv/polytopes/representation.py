@@ -19,13 +19,11 @@ AT_ZERO = "@0"
 def polytopic_model(system: DescriptorSystem, representation: str) -> PolytopicModel:
     """A system in the representation of that name.
 
-    | name | blocks | vertices |
-    |---|---|---|
-    | ``ts`` | one box of all r premises | 2^r |
-    | ``reduced`` | one simplex | r + 1 |
-    | ``per-premise`` | a box per premise | 2 r |
-    | ``uncertain`` | the same; for a system with unknown premises | 2 r |
-    | ``grouped=0,1+2`` | a box per group | sum of 2^size |
+    * ``ts``: one box of all r premises, 2^r vertices
+    * ``reduced``: one simplex, r + 1 vertices
+    * ``per-premise``: a box per premise, 2 r vertices
+    * ``uncertain``: the same, for a system with unknown premises
+    * ``grouped=0,1+2``: a box per group, the sum of 2^size vertices
 
     With the suffix ``@0`` the vertices are centred at z = 0 instead of at the centre of the box: another representation
     of the same matrices, for double sums not equivalent even with slack (a single block has no centre).

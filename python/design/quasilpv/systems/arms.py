@@ -200,7 +200,7 @@ class PlanarSerialArm(PlanarMechanism):
         return np.array([theta1, theta2, Phi - theta1 - theta2])
 
     def singularity(self, theta: ArrayLike) -> tuple[str, float]:
-        """|sin(theta_2)|: the 3-DoF arm is singular when its first two links are in line."""
+        """`|sin(theta_2)|`: the 3-DoF arm is singular when its first two links are in line."""
         return "|sin(theta_2)|", float(abs(np.sin(np.asarray(theta, dtype=float)[1])))
 
     # ---- perturbation ----------------------------------------------------------------------------------------------

@@ -1,0 +1,76 @@
+"""Sphinx configuration: pages of docs/, Python API from docstrings, C++ API from headers, the command's own help."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+import quasilpv
+
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
+DOXYGEN_OUTPUT = ROOT / "build/docs/doxygen"
+
+sys.path.append(str(DOCS / "_extensions"))
+
+project = "quasilpv"
+author = "the quasilpv authors"
+project_copyright = author
+version = release = quasilpv.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "command_help",
+    "header_table",
+]
+exclude_patterns = ["_*"]
+default_role = "code"
+suppress_warnings = ["ref.python"]  # attributes named after printed symbols (E, A, B, P) occur in several classes
+
+myst_heading_anchors = 3
+
+autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+napoleon_numpy_docstring = False
+napoleon_custom_sections = [("Attributes", "params_style")]  # one entry each for "E, A, B, C: ..."
+add_module_names = False
+toc_object_entries = False
+python_maximum_signature_line_length = 100
+
+html_theme = "furo"
+html_title = "quasilpv"
+html_copy_source = False
+html_show_sphinx = False
+html_static_path = ["_static"]
+html_css_files = ["quasilpv.css"]
+html_extra_path = [str(DOXYGEN_OUTPUT)]
+
+
+def run_doxygen() -> None:
+    """Write the C++ pages, which html_extra_path puts beside the others.
+
+    Raises:
+        RuntimeError: doxygen is not installed.
+        subprocess.CalledProcessError: a header's comment is wrong; doxygen has said where.
+    """
+    doxygen = shutil.which("doxygen")
+    if doxygen is None:
+        raise RuntimeError("doxygen is not installed: apt-get install doxygen")
+    shutil.rmtree(DOXYGEN_OUTPUT, ignore_errors=True)
+    DOXYGEN_OUTPUT.mkdir(parents=True)
+    subprocess.run([doxygen, str(DOCS / "_doxygen/Doxyfile")], cwd=ROOT, check=True)
+
+
+def is_noise(_app: object, _what: str, _name: str, member: object, _skip: bool, _options: object) -> bool | None:
+    """Leave out what says nothing: the fields of named tuples, which the class describes."""
+    return True if str(getattr(member, "__doc__", "")).startswith("Alias for field number") else None
+
+
+def setup(app: Sphinx) -> None:
+    """Connect the above."""
+    run_doxygen()
+    app.connect("autodoc-skip-member", is_noise)
