@@ -32,7 +32,6 @@ from math import exp
 import numpy as np
 import sympy as sp
 
-from quasilpv.conditions.blocks import double_sum, single_sum
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
@@ -41,7 +40,7 @@ from quasilpv.conditions.condition import (
     Statement,
     Values,
     require_regular,
-    single_sum_blocks,
+    vertex_sum,
 )
 from quasilpv.conditions.mismatch import Form, Mismatch, bounded_jacobian
 from quasilpv.conditions.sampled_observer import MULTIPLIER_SAMPLES
@@ -115,10 +114,7 @@ def statement(
     problem.positive("Q", Q)
     for tau in taus:
         problem.positive(tau.name, tau)
-    if options.common:
-        slacks = single_sum(problem, "Xi", lambda i: entry(i, i), count, single_sum_blocks(own, options.slack))
-    else:
-        slacks = double_sum(problem, "Xi", entry, count, own.polytope.block_index, slack=options.slack)
+    slacks = vertex_sum(problem, "Xi", entry, own, options.slack, single=options.common)
 
     def feedback(values: Values) -> Feedback:
         H_vertices, Y_vertices = (np.stack([values[X] for X in unknowns]) for unknowns in (H, Y))
