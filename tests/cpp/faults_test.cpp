@@ -44,9 +44,9 @@ std::vector<RobotReading> readings(std::int64_t count) {
   return result;
 }
 
-ControllerRunReport run_in_real_time(ControlLoop& loop, Robot& robot) {
+ControllerRunReport run(ControlLoop& loop, Robot& robot, Pace pace) {
   ControllerRunSettings settings;
-  settings.pace = Pace::kRealTime;
+  settings.pace = pace;
   settings.silence_s = 60.0;
   const std::atomic<bool> stop{false};
   return run_controller(loop, robot, settings, stop);
@@ -80,20 +80,20 @@ TEST(Faults, F1_when_one_angle_is_not_a_number_expect_one_flag_and_a_torque_with
 TEST(Faults, F4_when_an_older_reading_comes_later_expect_no_command_for_it) {
   ScriptedRobot robot({reading(0), reading(2), reading(1), reading(2), reading(3)});
   ControlLoop loop(artifact(), trajectory(), {});
-  run_in_real_time(loop, robot);
+  run(loop, robot, Pace::kRealTime);
   ASSERT_EQ(robot.commands().size(), 3u);
   EXPECT_EQ(robot.commands()[1].seq, 2);
   EXPECT_EQ(robot.commands()[2].seq, 3);
 }
 
 TEST(Faults, F5_when_100_foreign_messages_come_in_a_row_expect_a_latched_fault_and_at_99_none) {
-  for (const std::int64_t run : {99, 100}) {
+  for (const std::int64_t messages : {99, 100}) {
     ScriptedRobot robot(readings(2));
-    robot.set_foreign_run(run);
+    robot.set_foreign_run(messages);
     ControlLoop loop(artifact(), trajectory(), {});
-    run_in_real_time(loop, robot);
-    EXPECT_EQ(loop.cause(), run == 100 ? FaultCause::kForeignMessages : FaultCause::kNone);
-    EXPECT_EQ(loop.state(), run == 100 ? ControllerState::kFault : ControllerState::kRunning);
+    run(loop, robot, Pace::kLockStep);
+    EXPECT_EQ(loop.cause(), messages == 100 ? FaultCause::kForeignMessages : FaultCause::kNone);
+    EXPECT_EQ(loop.state(), messages == 100 ? ControllerState::kFault : ControllerState::kRunning);
   }
 }
 
@@ -195,7 +195,7 @@ TEST_P(Overrun, F12_is_counted_and_no_reading_is_answered_twice) {
   ScriptedRobot robot(readings(kReadings));
   robot.slow_down(to_nanoseconds(GetParam() * kSamplePeriod));
   ControlLoop loop(artifact(), trajectory(), {});
-  const ControllerRunReport report = run_in_real_time(loop, robot);
+  const ControllerRunReport report = run(loop, robot, Pace::kRealTime);
   EXPECT_EQ(report.deadline_overruns, kReadings);
   ASSERT_EQ(robot.commands().size(), static_cast<std::size_t>(kReadings));
   for (std::int64_t seq = 0; seq < kReadings; ++seq) {
@@ -212,7 +212,7 @@ TEST(Faults, F12_when_more_than_20_deadlines_are_missed_in_a_row_expect_a_latche
   ScriptedRobot robot(readings(22));
   robot.slow_down(3 * kMillisecond / 2);
   ControlLoop loop(artifact(), trajectory(), {});
-  run_in_real_time(loop, robot);
+  run(loop, robot, Pace::kRealTime);
   EXPECT_EQ(robot.commands()[20].state, ControllerState::kDegraded);  // 20 overruns before it
   EXPECT_EQ(robot.commands()[21].state, ControllerState::kFault);
   EXPECT_EQ(loop.cause(), FaultCause::kDeadlineOverrun);
