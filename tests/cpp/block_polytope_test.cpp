@@ -132,7 +132,9 @@ TEST(BlockPolytope, F9_has_weights_that_are_not_negative_and_sum_to_one_over_the
     const std::vector<std::vector<int>> partition = random_partition(premises, random);
     const BlockPolytope polytope = parse(affine.table(partition));
     std::vector<double> weight(static_cast<std::size_t>(polytope.vertices()));
-    polytope.weights(affine.random_point(random).data(), weight.data());
+    const std::vector<double> point = affine.random_point(random);
+    polytope.weights(point.data(), weight.data());
+    EXPECT_NEAR(polytope.weight_sum(point.data()), std::accumulate(weight.begin(), weight.end(), 0.0), 1e-15);
     auto next = weight.begin();
     for (const std::vector<int>& group : partition) {
       const auto end = next + (1 << group.size());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "quasilpv/step.hpp"
 
@@ -153,6 +154,28 @@ void BlockPolytope::weights(const double* premise, double* weight) const noexcep
       weight[block.first_vertex + corner] = corner_weight(block, corner, premise);
     }
   }
+}
+
+double BlockPolytope::weight_sum(const double* premise) const noexcept {
+  double sum = 0.0;
+  for (const Block& block : blocks_) {
+    const std::size_t corners = std::size_t{1} << block.premises.size();
+    for (std::size_t corner = 0; corner < corners; ++corner) {
+      sum += corner_weight(block, corner, premise);
+    }
+  }
+  return sum;
+}
+
+double BlockPolytope::excess(const double* premise) const noexcept {
+  double largest = 0.0;
+  for (std::size_t p = 0; p < centre_.size(); ++p) {
+    if (!std::isfinite(premise[p])) {
+      return std::numeric_limits<double>::infinity();
+    }
+    largest = std::max(largest, std::max(lower_[p] - premise[p], premise[p] - upper_[p]) / (upper_[p] - lower_[p]));
+  }
+  return largest;
 }
 
 // The first listed premise is the most significant bit of the corner.

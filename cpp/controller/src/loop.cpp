@@ -24,7 +24,8 @@ ControlLoop::ControlLoop(const Artifact& artifact, const Trajectory& trajectory,
     : controller_(artifact),
       trajectory_(trajectory),
       settings_(settings),
-      safe_torque_(artifact, settings.safe_action) {
+      safe_torque_(artifact, settings.safe_action),
+      monitor_(artifact) {
   if (trajectory.joints() != artifact.joints()) {
     throw InputError("trajectory '" + trajectory.name() + "'", "joints", std::to_string(trajectory.joints()),
                      std::to_string(artifact.joints()) + " as in artifact '" + artifact.name() + "'");
@@ -163,6 +164,10 @@ void ControlLoop::write_telemetry(const StepInput& input, const StepReport& repo
   copy(report.torque_commanded, telemetry_.commanded_torque_nm);
   copy(last_torque_, telemetry_.applied_torque_nm);
   std::copy(report.premise.begin(), report.premise.end(), telemetry_.premise);
+  const bool measured = (report.flags & kMeasurementInvalid) == 0;
+  const MonitorReport seen = monitor_.observe(measured ? input.angle : report.estimated_angle);
+  telemetry_.membership_sum = seen.membership_sum;
+  telemetry_.premise_excess = seen.premise_excess;
   post_mortem_.add(telemetry_);
   if (ring_ != nullptr) {
     telemetry_.drops = ring_->drops();

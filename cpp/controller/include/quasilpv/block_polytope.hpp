@@ -41,6 +41,14 @@ class BlockPolytope {
   /// \param[out] weight `vertices()` values, each >= 0.
   void weights(const double* premise, double* weight) const noexcept;
 
+  /// Sum of the weights of all vertices, for z inside the box: 1 up to rounding.
+  /// RT-SAFE (bounded, no allocation, no lock, no throw).
+  double weight_sum(const double* premise) const noexcept;
+
+  /// How far z is outside the box, in widths of the box: max_p max(lower_p - z_p, z_p - upper_p, 0) / (upper_p -
+  /// lower_p); infinite if a premise is not finite. RT-SAFE (bounded, no allocation, no lock, no throw).
+  double excess(const double* premise) const noexcept;
+
   int premises() const noexcept { return static_cast<int>(centre_.size()); }
   int vertices() const noexcept { return static_cast<int>(vertices_.size()); }
   /// Whether the other has the same box, centre and partition, so that one premise vector has the same weights in both.

@@ -7,6 +7,7 @@
 #include "quasilpv/controller.hpp"
 #include "quasilpv/failsafe.hpp"
 #include "quasilpv/latency_histogram.hpp"
+#include "quasilpv/monitor.hpp"
 #include "quasilpv/post_mortem.hpp"
 #include "quasilpv/robot.hpp"
 #include "quasilpv/safe_torque.hpp"
@@ -99,6 +100,7 @@ class ControlLoop {
   Trajectory trajectory_;
   LoopSettings settings_;
   SafeTorque safe_torque_;
+  Monitor monitor_;
   FailsafeState failsafe_;
   FailsafeFlags observed_;
   RobotCommand command_;
