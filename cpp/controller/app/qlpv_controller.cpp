@@ -51,7 +51,7 @@ void declare_all(CLI::App& app, Options& options) {
 }
 
 Json describe(const ControlLoop& loop, const ControllerRunReport& run, const TelemetryReport& telemetry,
-              const LinkCounters& counters, bool realtime) {
+              const Link& link, bool realtime) {
   return {{"end", to_string(run.end)},
           {"state", to_string(loop.state())},
           {"fault_cause", to_string(loop.cause())},
@@ -68,7 +68,8 @@ Json describe(const ControlLoop& loop, const ControllerRunReport& run, const Tel
           {"step_ns", to_json(loop.step_time())},
           {"wakeup_ns", to_json(run.arrival)},
           {"response_ns", to_json(run.response)},
-          {"link", to_json(counters)},
+          {"authenticated", link.is_authenticated()},
+          {"link", to_json(link.counters())},
           {"telemetry",
            {{"published", telemetry.published},
             {"drops", telemetry.drops},
@@ -100,6 +101,7 @@ int run(const CLI::App& app, Options& options) {
 
   const WireIdentity identity = identity_of(common, artifact);
   LcmLink link(Side::kController, identity, common.url, common.allow_network);
+  apply_key(common, link);
   auto telemetry_link =
       std::make_unique<LcmLink>(Side::kController, identity, common.url, common.allow_network, Listen::kNothing);
   TelemetryPublisher publisher(std::move(telemetry_link), artifact.sample_period_s(), artifact.joints(), common.record);
@@ -110,7 +112,7 @@ int run(const CLI::App& app, Options& options) {
   LinkRobot robot(link);
   const ControllerRunReport report = run_controller(loop, robot, options.run, install_stop_signals());
   const TelemetryReport telemetry = publisher.stop();
-  print_report(std::cout, describe(loop, report, telemetry, link.counters(), options.loop.realtime), common.json);
+  print_report(std::cout, describe(loop, report, telemetry, link, options.loop.realtime), common.json);
   return exit_code(loop, report, common);
 }
 
@@ -216,6 +218,7 @@ void declare_reset(CLI::App& app, CommonOptions& options) {
 int run_reset(const CommonOptions& options) {
   const Artifact artifact = Artifact::load(options.artifact);
   LcmLink link(Side::kOperator, identity_of(options, artifact), options.url, options.allow_network);
+  apply_key(options, link);
   switch (request_reset(link, options.timeout_s)) {
     case ResetOutcome::kLeft:
       return kExitDone;

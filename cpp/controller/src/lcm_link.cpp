@@ -143,7 +143,7 @@ LcmLink::LcmLink(Side side, const WireIdentity& identity, const std::string& url
   const MulticastAddress address = parse_url(url);
   if (address.time_to_live > 0 && !allow_network) {
     throw InputError("command line", "url", "ttl=" + std::to_string(address.time_to_live),
-                     "ttl=0 (this machine only), or --allow-network: messages are not authenticated");
+                     "ttl=0 (this machine only), or --allow-network: without --key messages are not authenticated");
   }
   require_multicast(address, url);
   connection_ = std::make_unique<Connection>(*this, url);

@@ -28,10 +28,18 @@ void Link::seal_and_transmit(Message message) noexcept {
   message.utime = monotonic_ns() / kNanosecondsPerMicrosecond;
   message.session = identity_.session;
   message.artifact_hash = identity_.artifact_hash;
-  if constexpr (!std::is_same_v<Message, event_v1>) {
+  if constexpr (std::is_same_v<Message, event_v1>) {
+    // No two events of a side have one time: in authenticated mode an equal one is a replayed one.
+    message.utime = last_event_utime_ = std::max(message.utime, last_event_utime_ + 1);
+  } else {
     message.joints = identity_.joints;
   }
   encode(message, packet_);
+  if (key_) {
+    const auto size = static_cast<std::size_t>(packet_.size);
+    key_->sign(packet_.bytes.data(), size, packet_.bytes.data() + size);
+    packet_.size += static_cast<int>(MessageKey::kTagBytes);
+  }
   if (!transmit(channel_of(message), packet_.bytes.data(), static_cast<std::size_t>(packet_.size))) {
     ++counters_.send_failures;
   }
@@ -54,25 +62,52 @@ void Link::accept(Channel channel, const void* bytes, std::size_t size) noexcept
 }
 
 template <class Message>
+DecodeStatus Link::open(const void* bytes, std::size_t size, Message& message) const noexcept {
+  if (!key_) {
+    return decode(bytes, size, identity_, message);
+  }
+  if (size < MessageKey::kTagBytes) {
+    return DecodeStatus::kNotAuthentic;
+  }
+  const auto* data = static_cast<const std::uint8_t*>(bytes);
+  const std::size_t signed_size = size - MessageKey::kTagBytes;
+  return key_->is_authentic(data, signed_size, data + signed_size) ? decode(data, signed_size, identity_, message)
+                                                                   : DecodeStatus::kNotAuthentic;
+}
+
+template <class Message>
 void Link::accept_into(Inbox<Message>& inbox, const void* bytes, std::size_t size) noexcept {
   Message message;
-  if (count(decode(bytes, size, identity_, message))) {
+  if (count(open(bytes, size, message))) {
     file(inbox, message);
   }
 }
 
 void Link::accept_event(const void* bytes, std::size_t size) noexcept {
   event_v1 event;
-  const DecodeStatus status = decode(bytes, size, identity_, event);
+  DecodeStatus status = open(bytes, size, event);
   // Both sides send on the channel of events, and multicast hands every sender its own packets back.
   if (status == DecodeStatus::kAccepted && event.source == static_cast<std::int32_t>(side_)) {
     return;
+  }
+  if (status == DecodeStatus::kAccepted && key_ && is_replayed(event)) {
+    status = DecodeStatus::kNotAuthentic;
   }
   if (count(status)) {
     // Events are rare and carry the sample index: several of one sample are not duplicates of each other.
     ++counters_.accepted;
     counters_.lost_events += events_.put(event) ? 0 : 1;
   }
+}
+
+// Measurements and commands are told apart by their seq, events only by their time.
+bool Link::is_replayed(const event_v1& event) noexcept {
+  const auto source = static_cast<std::size_t>(event.source) - 1;  // of an authentic event
+  if (source >= kSides || event.utime <= newest_event_utime_[source]) {
+    return true;
+  }
+  newest_event_utime_[source] = event.utime;
+  return false;
 }
 
 bool Link::EventQueue::put(const event_v1& event) noexcept {
@@ -105,6 +140,9 @@ bool Link::count(DecodeStatus status) noexcept {
     case DecodeStatus::kAccepted:
       counters_.consecutive_wrong = 0;
       return true;
+    case DecodeStatus::kNotAuthentic:
+      ++counters_.not_authentic;
+      return false;
     case DecodeStatus::kWrongLength:
       ++counters_.wrong_length;
       return false;

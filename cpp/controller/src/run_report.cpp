@@ -41,6 +41,7 @@ Json to_json(const LinkCounters& counters) {
           {"duplicates", counters.duplicates},
           {"old", counters.old},
           {"superseded", counters.superseded},
+          {"not_authentic", counters.not_authentic},
           {"wrong_length", counters.wrong_length},
           {"wrong_checksum", counters.wrong_checksum},
           {"wrong_type", counters.wrong_type},

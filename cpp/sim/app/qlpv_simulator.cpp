@@ -34,7 +34,7 @@ void declare_all(CLI::App& app, Options& options) {
       ->capture_default_str();
 }
 
-Json describe(const PlantRunReport& run, const LinkCounters& counters, bool realtime) {
+Json describe(const PlantRunReport& run, const Link& link, bool realtime) {
   return {{"end", to_string(run.end)},
           {"controller_state", to_string(run.controller_state)},
           {"samples", run.samples},
@@ -47,7 +47,8 @@ Json describe(const PlantRunReport& run, const LinkCounters& counters, bool real
           {"rt", realtime},
           {"wakeup_ns", to_json(run.wakeup)},
           {"round_trip_ns", to_json(run.round_trip)},
-          {"link", to_json(counters)}};
+          {"authenticated", link.is_authenticated()},
+          {"link", to_json(link.counters())}};
 }
 
 /// The record of a run, created before it starts so that a bad path costs nothing.
@@ -111,6 +112,7 @@ int run(const CLI::App& app, Options& options) {
   const bool realtime = apply_priority(app, common);
   const WireIdentity identity = identity_of(common, artifact);
   LcmLink link(Side::kPlant, identity, common.url, common.allow_network);
+  apply_key(common, link);
 
   options.run.pace = common.pace;
   options.run.timeout_s = common.timeout_s;
@@ -123,7 +125,7 @@ int run(const CLI::App& app, Options& options) {
     file.write();  // what led to the failure
     throw;
   }
-  print_report(std::cout, describe(report, link.counters(), realtime), common.json);
+  print_report(std::cout, describe(report, link, realtime), common.json);
   file.write();
   return exit_code(report, common);
 }

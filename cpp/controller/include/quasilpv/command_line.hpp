@@ -23,6 +23,7 @@ struct CommonOptions {
   std::int64_t session = 0;
   std::string url = kDefaultLcmUrl;
   bool allow_network = false;
+  std::string key;  ///< path; empty: messages are not authenticated
   std::string record;
   Pace pace = Pace::kLockStep;
   int priority = 0;  ///< 0: normal scheduling
@@ -45,11 +46,14 @@ inline std::string help_footer(const std::string& more_exit_codes = "") {
 inline void declare_identity(CLI::App& app, CommonOptions& options) {
   app.add_option("--artifact", options.artifact, "the controller, JSON or CBOR")->required();
   app.add_option("--session", options.session, "a number of your choice, the same on both sides")->required();
+  app.add_option("--key", options.key,
+                 "sign messages, and accept signed ones only: a file of mode 0600 with the secret");
 }
 
 inline void declare_transport(CLI::App& app, CommonOptions& options) {
   app.add_option("--url", options.url, "LCM address")->capture_default_str();
-  app.add_flag("--allow-network", options.allow_network, "accept a url with ttl > 0; messages are not authenticated");
+  app.add_flag("--allow-network", options.allow_network,
+               "accept a url with ttl > 0; without --key messages are not authenticated");
 }
 
 inline CLI::Option* declare_priority(CLI::App& app, CommonOptions& options) {
@@ -76,6 +80,13 @@ inline void declare(CLI::App& app, CommonOptions& options) {
 /// How this side signs its messages.
 inline WireIdentity identity_of(const CommonOptions& options, const Artifact& artifact) {
   return {options.session, artifact.hash_prefix(), artifact.joints()};
+}
+
+/// Puts the link into authenticated mode if `--key` asks for it. INIT-ONLY. Throws InputError like MessageKey::load().
+inline void apply_key(const CommonOptions& options, Link& link) {
+  if (!options.key.empty()) {
+    link.authenticate_with(MessageKey::load(options.key));
+  }
 }
 
 /// Throws the TransportError of a run in which the other side was never heard.

@@ -4,16 +4,19 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
+#include "quasilpv/message_key.hpp"
 #include "quasilpv/messages.hpp"
 
 namespace quasilpv {
 
-/// What a link received and what it refused; every packet is counted exactly once among the first eight.
+/// What a link received and what it refused; every packet is counted exactly once among the first nine.
 struct LinkCounters {
   std::int64_t accepted = 0;
-  std::int64_t duplicates = 0;  ///< the newest sequence number once more
-  std::int64_t old = 0;         ///< a lower sequence number than the newest
+  std::int64_t duplicates = 0;     ///< the newest sequence number once more
+  std::int64_t old = 0;            ///< a lower sequence number than the newest
+  std::int64_t not_authentic = 0;  ///< authenticated mode: no tag, that of another key, or an event once more
   std::int64_t wrong_length = 0;
   std::int64_t wrong_checksum = 0;
   std::int64_t wrong_type = 0;
@@ -36,6 +39,10 @@ class Link {
   virtual ~Link() = default;
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
+
+  /// From now on a tag is put behind every message sent, and only messages with the right one are accepted. INIT-ONLY.
+  void authenticate_with(const MessageKey& key) { key_ = key; }
+  bool is_authenticated() const noexcept { return key_.has_value(); }
 
   /// Fills utime, session, artifact_hash, joints and crc of a copy of the message and hands it to the transport; a
   /// failure is counted. RT-UNSAFE (system call); allocates nothing itself and never throws.
@@ -108,6 +115,9 @@ class Link {
   void accept_into(Inbox<Message>& inbox, const void* bytes, std::size_t size) noexcept;
   template <class Message>
   void file(Inbox<Message>& inbox, const Message& message) noexcept;
+  template <class Message>
+  DecodeStatus open(const void* bytes, std::size_t size, Message& message) const noexcept;
+  bool is_replayed(const event_v1& event) noexcept;
   void accept_event(const void* bytes, std::size_t size) noexcept;
   bool count(DecodeStatus status) noexcept;
 
@@ -118,6 +128,9 @@ class Link {
   Inbox<measurement_v1> measurement_;
   Inbox<command_v1> command_;
   EventQueue events_;
+  std::optional<MessageKey> key_;
+  std::int64_t last_event_utime_ = 0;                      // sent
+  std::array<std::int64_t, kSides> newest_event_utime_{};  // received, by source
   Packet packet_;
 };
 

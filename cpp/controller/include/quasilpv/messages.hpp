@@ -31,6 +31,7 @@ constexpr Channel channel_of(const event_v1& /*type*/) noexcept { return Channel
 
 /// Who sent an event (`event_v1::source`).
 enum class Side : std::int32_t { kController = 1, kPlant = 2, kOperator = 3 };
+inline constexpr std::size_t kSides = 3;
 
 /// What happened (`event_v1::code`).
 enum class EventCode : std::int32_t {
@@ -54,7 +55,8 @@ enum class DecodeStatus : std::uint8_t {
   kWrongChecksum,
   kWrongType,
   kWrongSession,
-  kWrongArtifact
+  kWrongArtifact,
+  kNotAuthentic  ///< no tag, or that of another key; never from decode()
 };
 
 /// Encoded message in a buffer of its own: nothing is allocated.

@@ -54,6 +54,10 @@ def hil_command(
         str | None,
         typer.Option("--url", help="LCM URL of both, so that others can listen.  [default: a port of its own]"),
     ] = None,
+    key: Annotated[
+        Path | None,
+        typer.Option("--key", metavar="FILE", help="Both sign what they say with this secret."),
+    ] = None,
     out: Annotated[
         Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for run files, records and logs.")
     ] = Path("out/hil"),
@@ -94,6 +98,7 @@ def hil_command(
             real_time=RealTimeOptions(silence_s, hold_s, priority),
             variant=variant,
             url=url,
+            key=key,
         )
         steps.end()
     if not real_time and over_lcm.fault is None:

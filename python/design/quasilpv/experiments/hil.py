@@ -100,6 +100,7 @@ def run_over_lcm(
     real_time: RealTimeOptions | None = None,
     variant: Variant | None = None,
     url: str | None = None,
+    key: Path | None = None,
 ) -> HilResult:
     """Run controller and plant as two processes on this machine, with a session of their own; log what they say.
 
@@ -113,6 +114,7 @@ def run_over_lcm(
         real_time: watchdog times and priority, read in real time only.
         variant: what to call the controller, by default its law kind.
         url: where they talk, by default on a port of their own.
+        key: of authenticated mode, a file of mode 0600; None: messages are not authenticated.
 
     Raises:
         InputError: robot and controller do not fit, an executable is missing, or the folder cannot be written.
@@ -123,6 +125,8 @@ def run_over_lcm(
     records = {CONTROLLER: folder / "controller.csv", SIMULATOR: folder / "plant.csv"}
     url = url or f"udpm://{MULTICAST_GROUP}:{49152 + secrets.randbelow(65536 - 49152)}?ttl=0"
     commands = _commands(files, records, mode, url)
+    if key is not None:
+        commands = {name: [*command, "--key", str(key)] for name, command in commands.items()}
     if mode == "realtime":
         commands = {name: [*command, *(real_time or RealTimeOptions()).of(name)] for name, command in commands.items()}
     limit_s = LOCK_STEP_LIMIT_S if mode == "lockstep" else experiment.trajectory.duration_s + 4 * SILENCE_S

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import lcm
 
 from quasilpv.errors import InputError, TransportError
+from quasilpv.telemetry.message_types import CHANNELS, channel_type
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
 _URL = re.compile(r"udpm://\d+(\.\d+){3}:\d+\?ttl=0")
@@ -15,6 +16,8 @@ _URL = re.compile(r"udpm://\d+(\.\d+){3}:\d+\?ttl=0")
 
 def listen(url: str, hear: Callable[[str, bytes], None]) -> lcm.LCM:
     """A subscription to every channel of the project; its `handle_timeout` calls ``hear(channel, data)``.
+
+    Of signed messages the tag is taken off unchecked: nothing that listens here acts on the arm.
 
     Raises:
         InputError: the URL is none of this machine.
@@ -26,6 +29,10 @@ def listen(url: str, hear: Callable[[str, bytes], None]) -> lcm.LCM:
         wire = lcm.LCM(url)
     except RuntimeError as error:
         raise TransportError(f"{url}: {error}") from error
+
+    def hear_content(channel: str, data: bytes) -> None:
+        hear(channel, channel_type(channel).content(data) if channel in CHANNELS else data)
+
     # LCM drops the newest message of a full queue: this one is never full.
-    wire.subscribe("QLPV_.*", hear).set_queue_capacity(0)
+    wire.subscribe("QLPV_.*", hear_content).set_queue_capacity(0)
     return wire

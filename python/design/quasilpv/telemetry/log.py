@@ -211,9 +211,10 @@ def _decode(kind: MessageType, events: list[Event]) -> Messages:
     refused: Counter[str] = Counter()
     kept: list[Event] = []
     for event in events:
-        reason = kind.refusal(event.data)
+        content = kind.content(event.data)
+        reason = kind.refusal(content)
         if reason is None:
-            kept.append(event)
+            kept.append(Event(event.utime, event.channel, content))
         else:
             refused[reason] += 1
     utime = np.array([event.utime for event in kept], dtype=np.int64)

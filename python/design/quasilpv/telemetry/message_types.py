@@ -31,6 +31,8 @@ CHANNELS = {
 """Type of the messages on each channel."""
 
 CRC_BYTES = 8
+TAG_BYTES = 16
+"""Behind every message of a run in authenticated mode."""
 _PRIMITIVES = {"int32_t": ">i4", "int64_t": ">i8", "double": ">f8"}
 _STRUCT = re.compile(r"struct\s+(\w+)\s*\{(.*?)\}", re.DOTALL)
 _MEMBER = re.compile(r"(\w+)\s+(\w+)\s*(?:\[(\d+)\])?\s*;")
@@ -63,6 +65,10 @@ class MessageType:
             body = record.tobytes()[:-CRC_BYTES]
             packets.append(body + zlib.crc32(body).to_bytes(CRC_BYTES, "big"))
         return packets
+
+    def content(self, packet: bytes) -> bytes:
+        """The message in a packet: without its tag, if it has one. The tag is not checked: that takes the key."""
+        return packet[:-TAG_BYTES] if len(packet) == self.record.itemsize + TAG_BYTES else packet
 
     def refusal(self, packet: bytes) -> str | None:
         """Why a packet is no message of this type: its length, fingerprint or checksum; None if it is one."""
