@@ -48,6 +48,7 @@ VERBS: Mapping[str, Verb] = {
     "animate": Verb("animate", "Robots in motion, with and without compensation."),
     "hil": Verb("hil", "Controller and plant as two processes over LCM."),
     "log": Verb("log", "What a run's log holds; figures, replay, MCAP."),
+    "view": Verb("view", "A run in 3-D and in plots, on a local web page."),
     "solve": Verb("solve", "Whether a condition holds for a system."),
     "boundary": Verb("boundary", "Where a condition stops being feasible."),
     "region": Verb("region", "A map of feasibility over two parameters."),

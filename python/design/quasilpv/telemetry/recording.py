@@ -79,7 +79,7 @@ class RunDocuments:
 def write_run(path: Path, documents: RunDocuments, columns: Columns) -> Path:
     """Write the log of a run in this process; its clock is that of the samples, k T, so equal runs give equal files.
 
-    Such a run has no fail-safe and measures no times: its state is always "running", its ``step_ns`` 0.
+    Such a run has no fail-safe, no monitor and no times: its state is always "running", what these would say is 0.
 
     Args:
         path: of the log.

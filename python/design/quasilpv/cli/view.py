@@ -1,0 +1,119 @@
+"""``design view``: a run in three dimensions and in plots, on a local web page."""
+
+from __future__ import annotations
+
+import sys
+import time
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from quasilpv.artifact import Artifact, read_artifact
+from quasilpv.cli.console import print_note
+from quasilpv.cli.logs import LogArtifactOption, open_log
+from quasilpv.errors import InputError, TransportError
+from quasilpv.experiments.logged import mechanism_of
+from quasilpv.scenarios import read_scenario
+from quasilpv.systems.mechanism import PlanarMechanism
+from quasilpv.systems.registry import robot
+from quasilpv.telemetry.listening import DEFAULT_URL
+from quasilpv.telemetry.log import LAST
+from quasilpv.view.live import LiveMotion
+from quasilpv.view.page import DEFAULT_PORT, Page
+from quasilpv.view.playback import Motion, Playback
+
+FRAME_S = 1.0 / 30.0
+
+
+def view_command(
+    *,
+    log: Annotated[
+        str | None,
+        typer.Option("--log", metavar="LOG", help=f"A log, or LAST: the newest one under out.  [default: {LAST}]"),
+    ] = None,
+    live: Annotated[bool, typer.Option("--live", help="Listen to a run instead; needs --artifact.")] = False,
+    url: Annotated[str, typer.Option("--url", help="Live: LCM URL of the run.")] = DEFAULT_URL,
+    artifact: LogArtifactOption = None,
+    scenario: Annotated[
+        Path | None,
+        typer.Option("--scenario", metavar="FILE", help="Live: whose plant is drawn.  [default: the robot's]"),
+    ] = None,
+    timeout_s: Annotated[
+        float, typer.Option("--timeout-s", min=0.0, help="Live: wait so long for the first sample.")
+    ] = 60.0,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Of the page; 0: any free one.")] = DEFAULT_PORT,
+    at: Annotated[
+        float | None, typer.Option("--at", metavar="SECONDS", help="Stand still at this time instead of playing.")
+    ] = None,
+    browser: Annotated[
+        bool | None, typer.Option("--browser/--no-browser", help="Open a browser.  [default: on a terminal]")
+    ] = None,
+) -> None:
+    """Show a run on a local web page: the robot, its reference, errors, torques, disturbance, premises, step times.
+
+    Pause, scrub, change the speed; drag to turn the scene. The page is served on the loopback interface only, until
+    Ctrl-C.
+
+    \b
+    Examples:
+      design view --log LAST
+      design view --live --artifact out/arm3/artifact.json
+    """
+    listener = None
+    if live:
+        if artifact is None or log is not None:
+            got = "no --artifact" if artifact is None else f"--log {log}"
+            raise InputError("command line", "--live", got, "--artifact FILE and no --log")
+        controller = read_artifact(artifact)
+        listener = LiveMotion(url, controller)
+        motion, title = _first_samples(listener, url, timeout_s), f"live: {controller.name}"
+        mechanism = _mechanism(controller, scenario)
+    else:
+        recorded = open_log(log or LAST, artifact)
+        controller, motion = recorded.artifact, Motion.of_log(recorded)
+        mechanism = mechanism_of(recorded.scenario.plant)
+        title = f"{recorded.scenario.name}, {recorded.header.controller}"
+    page = Page(Playback(title, motion, mechanism, _disturbance_unit(controller)), port, listener)
+    if at is not None:
+        page.player.playing = False
+        page.player.seek(at)
+    print(page.url, flush=True)
+    if sys.stdout.isatty() if browser is None else browser:
+        webbrowser.open(page.url)
+    print_note("Ctrl-C ends the view")
+    _run(page)
+
+
+def _run(page: Page) -> None:
+    last = time.monotonic()
+    try:
+        while True:
+            time.sleep(FRAME_S)
+            now = time.monotonic()
+            page.step(now - last)
+            last = now
+    except KeyboardInterrupt:
+        page.close()
+
+
+def _first_samples(listener: LiveMotion, url: str, timeout_s: float) -> Motion:
+    deadline = time.monotonic() + timeout_s
+    print_note(f"waiting for telemetry on {url}")
+    while (motion := listener.poll()) is None:
+        if time.monotonic() > deadline:
+            heard = (
+                ", ".join(f"{count} of {reason}" for reason, count in listener.refused.items() if count) or "nothing"
+            )
+            raise TransportError(f"{url}: no telemetry of this artifact within {timeout_s:g} s; heard {heard}")
+        time.sleep(FRAME_S)
+    return motion
+
+
+def _mechanism(controller: Artifact, scenario: Path | None) -> PlanarMechanism:
+    return robot(controller.robot.id).model if scenario is None else mechanism_of(read_scenario(scenario).plant)
+
+
+def _disturbance_unit(controller: Artifact) -> str:
+    return "rad/s²" if controller.law.kind == "dob-acceleration" else "N m"
