@@ -29,7 +29,6 @@ extensions = [
 ]
 exclude_patterns = ["_*"]
 default_role = "code"
-suppress_warnings = ["ref.python"]  # attributes named after printed symbols (E, A, B, P) occur in several classes
 
 myst_heading_anchors = 3
 
