@@ -6,6 +6,11 @@ never an exception of this module.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+MOST_NAMES = 20
+
 
 class QuasilpvError(Exception):
     """Root of every exception this package raises on purpose; its message is one line fit for a terminal."""
@@ -32,6 +37,21 @@ class InputError(QuasilpvError):
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
         """Rebuild from the four parts, so that the error survives a process boundary (parallel sweeps)."""
         return type(self), (self.source, self.field, self.got, self.expected)
+
+
+def one_of(names: Iterable[str], got: str) -> str:
+    """What was expected where a name is unknown: the names there are, and the one that was probably meant.
+
+    Args:
+        names: those known; of more than `MOST_NAMES` only the closest are printed.
+        got: the unknown one.
+    """
+    known = list(names)
+    close = get_close_matches(got, known, n=3)
+    if len(known) > MOST_NAMES:
+        return f"{', '.join([*close, 'one' if not close else 'or another'])} of design list"
+    listed = f"one of {', '.join(known)}"
+    return f"{listed}; did you mean {close[0]}?" if close else listed
 
 
 class PlantError(QuasilpvError):

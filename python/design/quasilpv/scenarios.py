@@ -21,7 +21,7 @@ from quasilpv.artifact.canonical import MAX_SAFE_INTEGER, Document, member_path,
 from quasilpv.artifact.files import read_bytes, write_readable_json
 from quasilpv.artifact.programs import MAX_JOINTS
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, one_of
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.systems.registry import Robot
 from quasilpv.trajectories import Trajectory, fivebar_spiral, rest, serial_circle, serial_square
@@ -307,7 +307,7 @@ def tracking_task(name: str) -> TrackingTask:
     """
     known = {task.id: task for task in tracking_tasks()}
     if name not in known:
-        raise InputError("scenarios", "scenario", name, f"one of {', '.join(known)}")
+        raise InputError("scenarios", "scenario", name, one_of(known, name))
     return known[name]
 
 

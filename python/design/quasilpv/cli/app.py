@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import typer
 
 from quasilpv import __version__
+from quasilpv.cli.usage import usage_error
 from quasilpv.cli.verbs import VerbGroup
 from quasilpv.errors import (
     ClaimError,
@@ -34,6 +35,7 @@ HELP = """Control design for nonlinear descriptor systems and robots, from the m
 
 \b
 Examples:
+  design demo
   design list
   design synth arm3 -o out/arm3
   design inspect out/arm3/artifact.json
@@ -59,7 +61,6 @@ app = typer.Typer(
     cls=VerbGroup,
     help=HELP,
     no_args_is_help=False,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
@@ -93,7 +94,7 @@ def run(arguments: Sequence[str]) -> int:
             return _fail("interrupted", EXIT_INTERRUPTED)
         return code if isinstance(code, int) else 0
     except typer.TyperException as error:
-        return _fail(f"command line: {error.format_message()} (design --help explains)", 2)
+        return _fail(str(usage_error(error)), 2)
     except QuasilpvError as error:
         codes = (code for kind, code in EXIT_CODES if isinstance(error, kind))
         return _fail(str(error), next(codes, 1))

@@ -20,7 +20,7 @@ from quasilpv.cli.options import (
     sensors_of,
 )
 from quasilpv.cli.results import COLUMNS, cells
-from quasilpv.errors import FaultStop
+from quasilpv.errors import FaultStop, InputError
 from quasilpv.experiments.hil import HilResult, Mode, RealTimeOptions, require_identical, run_over_lcm
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.track import PlantKind, TrackingExperiment, track, variant_of
@@ -73,6 +73,8 @@ def hil_command(
     Example:
       design hil serial-square --real-time
     """
+    if priority is not None and not real_time:
+        raise InputError("command line", "--priority", priority, "nothing without --real-time: lock-step has no clock")
     experiment = TrackingExperiment.registered(scenario)
     kind = cast(PlantKind, plant_kind(plant))
     variant = Variant(require_controller(controller), ENCODER_BITS if encoder_bits is None else encoder_bits)

@@ -8,21 +8,32 @@ from typing import Annotated, TypeAlias
 import typer
 
 from quasilpv.artifact import Artifact
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, one_of
 from quasilpv.experiments.designs import kept_design
 from quasilpv.experiments.result import Variant
 from quasilpv.scenarios import ENCODER_BITS, Sensors
-from quasilpv.synthesis import CONTROLLERS, Specification, controller_kind
+from quasilpv.synthesis import CONTROLLERS, ControllerKind, Specification, controller_kind
 from quasilpv.synthesis.acceleration_design import Progress
 from quasilpv.systems.registry import robot
 
 SHORT_NAMES = {"acceleration": "dob-acceleration", "moving": "dob-moving", "torque": "dob-torque"}
 
+
+def _default_rates() -> str:
+    """``1000; 4000 for ...``: the rates of `CONTROLLERS`, the most common first."""
+    usual = ControllerKind.rate_hz
+    others: dict[float, list[str]] = {}
+    for name, kind in CONTROLLERS.items():
+        if kind.rate_hz != usual:
+            others.setdefault(kind.rate_hz, []).append(name)
+    return "; ".join([f"{usual:g}", *(f"{rate:g} for {', '.join(names)}" for rate, names in others.items())])
+
+
 RateOption: TypeAlias = Annotated[
     float | None,
     typer.Option(
         "--rate-hz",
-        help="Sample rate; the controller is designed for it.  [default: 1000, dob-torque and hinf-tracking 4000]",
+        help=f"Sample rate; the controller is designed for it.  [default: {_default_rates()}]",
     ),
 ]
 EncoderOption: TypeAlias = Annotated[
@@ -83,7 +94,7 @@ def require_controller(controller: str) -> str:
     """
     full = SHORT_NAMES.get(controller, controller)
     if full not in CONTROLLERS:
-        raise InputError("command line", "controller", controller, f"one of {', '.join([*CONTROLLERS, *SHORT_NAMES])}")
+        raise InputError("command line", "controller", controller, one_of([*CONTROLLERS, *SHORT_NAMES], controller))
     return full
 
 

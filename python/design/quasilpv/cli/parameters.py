@@ -150,4 +150,4 @@ def _number(part: str, option: str, text: str) -> float:
     try:
         return float(part)
     except ValueError:
-        raise InputError("command line", option, text, "numbers") from None
+        raise InputError("command line", option, text, f"a number instead of {part or 'nothing'}") from None

@@ -36,7 +36,7 @@ def reproduce_command(
     """
     if everything == bool(ids):
         got = "both items and --all" if ids else "nothing"
-        raise InputError("command line", "reproduce", got, f"--all, or items of {', '.join(ITEMS)}")
+        raise InputError("command line", "reproduce", got, "--all, or items of design list")
     wanted = list(ITEMS.values()) if everything else [item(name) for name in dict.fromkeys(ids or ())]
     with progress(len(wanted)) as steps:
         effort = Effort.QUICK if quick else Effort.FULL

@@ -19,7 +19,7 @@ from quasilpv.cli.options import (
     specification,
 )
 from quasilpv.release import release
-from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER
+from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, Specification
 from quasilpv.systems.registry import robot
 
 
@@ -59,28 +59,48 @@ def synth_command(
     wanted = specification(
         robot_id, design, rate_hz, encoder_bits, margin_spare=margin_spare, torque_activity=torque_activity
     )
+    answer = write_released(robot_id, design, wanted, out or Path("out") / robot_id, allow_unverified=allow_unverified)
+    if json:
+        print_json(answer)
+    else:
+        print_released(answer)
+
+
+def write_released(
+    robot_id: str, design: str, wanted: Specification, out: Path, *, allow_unverified: bool = False
+) -> dict[str, Any]:
+    """Design a controller, have it checked, and write both twins of its artifact into a folder; what --json prints.
+
+    Raises:
+        InputError: unknown names, or the folder cannot be written.
+        InfeasibleError: no design meets the specification, or what it claims does not hold.
+    """
     with progress(1) as steps:
         steps.begin(f"{design} for {robot_id}")
         made = release(robot_id, design, wanted, allow_unverified=allow_unverified, progress=steps.parts)
         steps.end()
-    paths = write_artifact(out or Path("out") / robot_id, made.artifact)
-    evidence = {name: found for name, found in (made.artifact.verification or {}).items() if name != "report"}
-    answer: dict[str, Any] = {
+    paths = write_artifact(out, made.artifact)
+    return {
         "artifact": {path.suffix.removeprefix("."): str(path) for path in paths},
         "name": made.artifact.name,
         "hash": made.artifact.hash,
         "report": dict(made.report),
-        "verification": evidence,
+        "verification": {name: found for name, found in (made.artifact.verification or {}).items() if name != "report"},
     }
-    if json:
-        print_json(answer)
-        return
-    tables = {made.artifact.name: made.report, **{name: evidence[name] for name in ("certificate", "gate") if evidence}}
+
+
+def print_released(answer: dict[str, Any]) -> None:
+    """Print what `write_released` found, as tables."""
+    evidence = answer["verification"]
+    tables = {
+        answer["name"]: answer["report"],
+        **{name: evidence[name] for name in ("certificate", "gate") if evidence},
+    }
     for title, members in tables.items():
         print_table(title, ("", ""), [(name, _text(value)) for name, value in members.items()], 2)
     if "released_unverified" in evidence:
         print_note("released although not verified: the artifact says so")
-    for path in paths:
+    for path in answer["artifact"].values():
         print_note(f"wrote {path}")
 
 

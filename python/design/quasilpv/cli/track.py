@@ -23,7 +23,7 @@ from quasilpv.cli.options import (
 from quasilpv.cli.results import print_results
 from quasilpv.cli.session import Session, draw_results
 from quasilpv.errors import InputError
-from quasilpv.experiments.result import Variant
+from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.track import PlantKind, TrackingExperiment, variant_of
 from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
@@ -90,6 +90,19 @@ def track_command(
     given = None if artifact is None else _given(artifact, controllers, rate_hz, no_compensation)
     variants = _variants(given, controllers, encoder_bits, no_compensation)
     session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out)
+    results = run_all(session, experiments, variants)
+    if not json if figures is None else figures:
+        draw_results(results, out)
+    if json:
+        print_json([result.row() for result in results])
+    else:
+        print_results(results)
+
+
+def run_all(
+    session: Session, experiments: Sequence[TrackingExperiment], variants: Sequence[Variant]
+) -> list[TrackResult]:
+    """Run every variant on every experiment; their rows are kept in ``results.json`` of the session's folder."""
     results = []
     with progress(len(experiments) * len(variants)) as steps:
         for experiment in experiments:
@@ -97,13 +110,14 @@ def track_command(
                 steps.begin(f"{experiment.name}: {variant.label}")
                 results.append(session.run(experiment, variant, steps))
                 steps.end()
-    write_readable_json(out / "results.json", [result.row() for result in results])
-    if not json if figures is None else figures:
-        draw_results(results, out)
-    if json:
-        print_json([result.row() for result in results])
-    else:
-        print_results(results)
+    write_readable_json(session.out / "results.json", [result.row() for result in results])
+    return results
+
+
+def default_variants() -> list[Variant]:
+    """The controllers that run if none is chosen."""
+    coarse = Variant(DEFAULT_CONTROLLER, COARSE_ENCODER_BITS)
+    return [*(Variant(name, ENCODER_BITS) for name in DEFAULT_CONTROLLERS), coarse]
 
 
 def _given(path: Path, controllers: Sequence[str] | None, rate_hz: float | None, no_compensation: bool) -> Artifact:
@@ -124,7 +138,6 @@ def _variants(
         return [variant_of(given, sensors)]
     if no_compensation:
         return [Variant(require_controller(name), bits, False) for name in controllers or [DEFAULT_CONTROLLER]]
-    variants = [Variant(require_controller(name), bits) for name in controllers or DEFAULT_CONTROLLERS]
     if not controllers and encoder_bits is None:
-        variants.append(Variant(DEFAULT_CONTROLLER, COARSE_ENCODER_BITS))
-    return variants
+        return default_variants()
+    return [Variant(require_controller(name), bits) for name in controllers or DEFAULT_CONTROLLERS]

@@ -12,7 +12,9 @@ from importlib import import_module
 from typing import Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import CompletionItem, TyperCommand, TyperGroup  # type: ignore[attr-defined]
+
+from quasilpv.errors import InputError, one_of
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ class Verb:
 
 
 VERBS: Mapping[str, Verb] = {
+    "demo": Verb("demo", "The main job: design, track, table and figures."),
     "list": Verb("listing", "What there is: robots, controllers, scenarios, conditions."),
     "synth": Verb("synth", "Design a controller and write its artifact."),
     "inspect": Verb("inspect", "What is in an artifact."),
@@ -76,6 +79,21 @@ class VerbGroup(TyperGroup):
     def __init__(self, **attributes: Any) -> None:
         """Take what typer gives a group, except commands."""
         super().__init__(**{**attributes, "commands": _Commands()})
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The verb that is asked for.
+
+        Raises:
+            InputError: there is none of this name.
+        """
+        if args[0] not in VERBS and not args[0].startswith("-"):
+            raise InputError("command line", "verb", args[0], one_of(VERBS, args[0]))
+        return super().resolve_command(ctx, args)
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[CompletionItem]:
+        """The verbs and options that begin so, without importing the verbs."""
+        verbs = [CompletionItem(name, help=verb.summary) for name, verb in VERBS.items() if name.startswith(incomplete)]
+        return [*verbs, *super(TyperGroup, self).shell_complete(ctx, incomplete)]
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """List the verbs without importing them."""

@@ -21,7 +21,7 @@ from quasilpv.conditions import (
     ts_pj,
 )
 from quasilpv.conditions.condition import Condition
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, one_of
 
 CONDITIONS: dict[str, Condition] = {
     entry.id: entry
@@ -54,5 +54,5 @@ def condition(name: str) -> Condition:
         InputError: there is none; the message lists those there are.
     """
     if name not in CONDITIONS:
-        raise InputError("conditions", "condition", name, f"one of {', '.join(CONDITIONS)}")
+        raise InputError("conditions", "condition", name, one_of(CONDITIONS, name))
     return CONDITIONS[name]

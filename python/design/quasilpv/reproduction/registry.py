@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, one_of
 from quasilpv.reproduction import (
     chapter_one,
     chapter_three,
@@ -54,5 +54,5 @@ def item(name: str) -> Item:
         InputError: there is none; the message lists those there are.
     """
     if name not in ITEMS:
-        raise InputError("reproduction", "item", name, f"one of {', '.join(ITEMS)}")
+        raise InputError("reproduction", "item", name, one_of(ITEMS, name))
     return ITEMS[name]

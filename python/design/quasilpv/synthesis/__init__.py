@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, one_of
 from quasilpv.synthesis import baselines, stabilisation, tuned_baselines
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.acceleration_law import acceleration_law, moving_acceleration_law
@@ -98,7 +98,7 @@ def controller_kind(controller: str) -> ControllerKind:
         InputError: there is none; the message lists those there are.
     """
     if controller not in CONTROLLERS:
-        raise InputError("controllers", "controller", controller, f"one of {', '.join(CONTROLLERS)}")
+        raise InputError("controllers", "controller", controller, one_of(CONTROLLERS, controller))
     return CONTROLLERS[controller]
 
 

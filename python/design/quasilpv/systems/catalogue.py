@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, one_of
 from quasilpv.systems.arm_stabilisation import arm2_kind, arm3_kind, frictionless_arm3_kind
 from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.regular_example import regular_example
@@ -42,5 +42,5 @@ def system(name: str, **parameters: float) -> DescriptorSystem:
             meaning.
     """
     if name not in SYSTEMS:
-        raise InputError("systems", "system", name, f"one of {', '.join(SYSTEMS)}")
+        raise InputError("systems", "system", name, one_of(SYSTEMS, name))
     return SYSTEMS[name].system(**parameters)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import pi
 
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, one_of
 from quasilpv.systems.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
 from quasilpv.systems.arms import PlanarSerialArm
 from quasilpv.systems.fivebar import RhombicFiveBar
@@ -60,7 +60,7 @@ def robot(name: str) -> Robot:
     """
     known = {entry.id: entry for entry in robots()}
     if name not in known:
-        raise InputError("robots", "robot", name, f"one of {', '.join(known)}")
+        raise InputError("robots", "robot", name, one_of(known, name))
     return known[name]
 
 

@@ -1,0 +1,54 @@
+"""``design demo``: the main job, from the model of a robot to the table of its controllers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from quasilpv.cli.console import JsonOption, print_json, print_note
+from quasilpv.cli.options import specification
+from quasilpv.cli.results import print_results
+from quasilpv.cli.session import Session, draw_results
+from quasilpv.cli.synth import write_released
+from quasilpv.cli.track import default_variants, run_all
+from quasilpv.experiments.track import TrackingExperiment
+from quasilpv.synthesis import DEFAULT_CONTROLLER
+
+ROBOT = "arm3"
+SCENARIOS = ("serial-square", "serial-circle")
+
+
+def demo_command(
+    *,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder of everything that is made.")] = Path(
+        "out/demo"
+    ),
+    json: JsonOption = False,
+) -> None:
+    """Design the default controller of the 3-DoF arm, then track the square and the circle with every controller.
+
+    Writes the artifact, a log and the figures of every run, and prints the table.
+
+    \b
+    The same, step by step:
+      design synth arm3 -o out/demo/arm3
+      design track serial-square serial-circle -o out/demo
+
+    \b
+    Example:
+      design demo
+    """
+    if not json:
+        print_note(f"a design for {ROBOT}, then every controller on {' and '.join(SCENARIOS)}: a few minutes")
+    released = write_released(
+        ROBOT, DEFAULT_CONTROLLER, specification(ROBOT, DEFAULT_CONTROLLER, None, None), out / ROBOT
+    )
+    session = Session(None, None, "perturbed", out)
+    results = run_all(session, [TrackingExperiment.registered(name) for name in SCENARIOS], default_variants())
+    draw_results(results, out)
+    if json:
+        print_json({**released, "runs": [result.row() for result in results]})
+    else:
+        print_results(results)

@@ -1,0 +1,77 @@
+"""Mistakes in the use of the command line, in the form of every other error: field, got, expected."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import typer
+from pydantic import ValidationError
+
+from quasilpv.errors import InputError, one_of
+
+NUMBERS = {"float_parsing": "a number", "int_parsing": "a whole number", "int_from_float": "a whole number"}
+LIMITS = {"greater_than_equal": ("at least", "ge"), "less_than_equal": ("at most", "le")}
+
+
+def usage_error(error: typer.TyperException) -> InputError:
+    """What the parser refused, as a line that names the verb whose help explains it."""
+    context = getattr(error, "ctx", None)
+    field, got, expected = _parts(error, context)
+    return InputError(
+        "command line", field, got, f"{expected} ({context.command_path if context else 'design'} --help)"
+    )
+
+
+def _parts(error: typer.TyperException, context: Any) -> tuple[str, str, str]:
+    """Field, got, expected; of mistakes the parser has its own words for, those."""
+    parameter = getattr(error, "param", None)
+    field = "arguments" if parameter is None else _name(parameter)
+    option = getattr(error, "option_name", None)
+    if isinstance(error.__cause__, ValidationError):
+        return (field, *_value(error.__cause__))
+    if parameter is not None and not getattr(error, "message", ""):
+        return field, "nothing", _first_sentence(parameter.help) or "a value"
+    if option is not None and hasattr(error, "possibilities"):
+        options = [name for known in context.command.get_params(context) for name in known.opts if name.startswith("-")]
+        return "option", option, one_of(options, option)
+    if option is not None:
+        return (option, "a value", "none") if "does not take" in str(error) else (option, "nothing", "a value")
+    extra = re.fullmatch(r"Got unexpected extra argument\(s\) \((.*)\)", getattr(error, "message", ""))
+    if extra:
+        known = [_name(one) for one in context.command.get_params(context) if one.param_type_name == "argument"]
+        return field, f"{extra[1]} too", f"no more than {' '.join(known) or 'options'}"
+    return field, error.format_message(), "another use"
+
+
+def _name(parameter: Any) -> str:
+    """As a person types it: the long form of an option, an argument as its help shows it."""
+    if parameter.param_type_name == "option":
+        return str(max(parameter.opts, key=len))
+    return str(parameter.metavar or parameter.name.upper())
+
+
+def _value(error: ValidationError) -> tuple[str, str]:
+    """Got and expected of a value of the wrong type or out of range."""
+    first = error.errors(include_url=False)[0]
+    kind, context = first["type"], first.get("ctx", {})
+    got = str(first["input"])
+    if kind in NUMBERS:
+        return got, NUMBERS[kind]
+    if kind in LIMITS:
+        words, key = LIMITS[kind]
+        return got, f"{words} {context[key]:g}"
+    return got, _choices(first["msg"], context)
+
+
+def _choices(message: str, context: Mapping[str, Any]) -> str:
+    """The choices a message about an unknown one lists; else the message."""
+    _, listed, choices = str(context.get("error", message)).partition(" is not one of ")
+    return f"one of {choices.replace(chr(39), '').rstrip('.')}" if listed else message
+
+
+def _first_sentence(text: str | None) -> str:
+    """The first sentence of a help text, to go on with after a comma."""
+    sentence = (text or "").partition(".  [")[0].partition(". ")[0].rstrip(".")
+    return sentence if sentence[:2].isupper() else sentence[:1].lower() + sentence[1:]

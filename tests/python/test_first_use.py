@@ -1,0 +1,108 @@
+"""What a stranger meets first: a wrong use is answered with the line that says what to do instead; completion; demo."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from quasilpv.cli import run
+from quasilpv.cli.verbs import VERBS
+from quasilpv.errors import MOST_NAMES, one_of
+from quasilpv.synthesis import CONTROLLERS
+
+WRONG_USES = {
+    "trakc serial-square": f"command line: verb: got trakc, expected one of {', '.join(VERBS)}; did you mean track?",
+    "list --colour": "command line: option: got --colour, expected one of --json, -h, --help (design list --help)",
+    "synth": "command line: ROBOT: got nothing, expected robot id, see design list (design synth --help)",
+    "synth arm3 --rate-hz fast": "command line: --rate-hz: got fast, expected a number (design synth --help)",
+    "synth arm9": "robots: robot: got arm9, expected one of arm2, arm3, arm2-upright, arm3-light, fivebar, "
+    "spring-disc; did you mean arm3?",
+    "synth arm3 --rate-hz -5": "specification: rate_hz: got -5.0, expected a number in [50, 50000]",
+    "verify missing.json": "missing.json: file: got No such file or directory, expected a readable file",
+    "hil serial-square serial-circle": "command line: arguments: got serial-circle too, expected no more than SCENARIO "
+    "(design hil --help)",
+    "hil serial-square --priority 50": "command line: --priority: got 50, expected nothing without --real-time: "
+    "lock-step has no clock",
+    "solve ex-I.1 --condition II.6 --slack some": "command line: --slack: got some, expected one of none, thesis, "
+    "pairs, full (design solve --help)",
+    "region ex-I.1 --condition II.6 --x a=-8:8 --y b=0:1:3": "command line: --x: got a=-8:8, expected "
+    "NAME=FROM:TO:POINTS",
+    "reproduce fig-II.9": "reproduction: item: got fig-II.9, expected fig-II.7, fig-II.6, fig-II.5, or another of "
+    "design list",
+}
+
+
+@pytest.mark.parametrize(("command", "message"), WRONG_USES.items(), ids=WRONG_USES)
+def test_when_used_wrongly_expect_exactly_this_line_and_exit_2(
+    command: str, message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(command.split()) == 2
+    assert capsys.readouterr() == ("", f"error: {message}\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("--json=3", "--json: got a value, expected none"),
+        ("--rate-hz", "--rate-hz: got nothing, expected a value"),
+        ("--encoder-bits 3.5", "--encoder-bits: got 3.5, expected a whole number"),
+    ],
+)
+def test_when_an_option_has_no_value_or_a_wrong_one_expect_the_option_named(
+    option: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["synth", "arm3", *option.split()]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_when_many_names_are_known_expect_only_the_closest() -> None:
+    many = [f"fig-{number}" for number in range(MOST_NAMES + 1)]
+    assert one_of(many, "fgi-7").startswith("fig-7, ")
+    assert one_of(many, "?") == "one of design list"
+    assert one_of(many[:2], "?") == "one of fig-0, fig-1"
+
+
+def test_help_of_the_rate_names_every_controller_with_a_rate_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["synth", "--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split()).rpartition("--rate-hz")[2].partition("]")[0]
+    fast = {name for name, kind in CONTROLLERS.items() if kind.rate_hz == 4000.0}
+    assert fast
+    assert set(text.partition("4000 for ")[2].split(", ")) == fast
+
+
+def complete(words: str) -> subprocess.CompletedProcess[str]:
+    """What bash is offered after these words."""
+    program = """
+import atexit, sys
+from quasilpv.cli import run
+atexit.register(lambda: print(*sys.modules, file=sys.stderr))
+run([])
+"""
+    count = len(words.split(" ")) - 1
+    environment = {"COMP_WORDS": words, "COMP_CWORD": str(count), "_DESIGN_COMPLETE": "complete_bash"}
+    return subprocess.run(
+        [sys.executable, "-c", program], env=os.environ | environment, capture_output=True, text=True, check=False
+    )
+
+
+def test_when_a_verb_is_begun_expect_its_completions_and_no_verb_imported() -> None:
+    offered = complete("design re")
+    assert offered.stdout.split() == [verb for verb in VERBS if verb.startswith("re")] == ["region", "reproduce"]
+    assert "sympy" not in offered.stderr.split()
+
+
+def test_when_an_option_of_a_verb_is_begun_expect_its_completions() -> None:
+    assert complete("design list --j").stdout.split() == ["--json"]
+
+
+def test_when_the_shell_asks_for_its_script_expect_one_that_calls_the_command() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "quasilpv", "--show-completion", "bash"], capture_output=True, text=True, check=True
+    )
+    assert "_DESIGN_COMPLETE=complete_bash" in done.stdout
