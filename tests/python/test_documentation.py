@@ -227,6 +227,18 @@ def test_every_test_named_in_the_documentation_exists() -> None:
     assert named - defined == set()
 
 
+def test_the_architecture_names_every_room_of_the_package() -> None:
+    rooms = {path.parent.name for path in (ROOT / "python/design/quasilpv").glob("*/__init__.py")}
+    assert len(rooms) > 10
+    assert rooms - set(code_spans(ROOT / "docs/architecture.md")) == set()
+
+
+def test_every_public_header_says_in_its_first_line_what_it_is_for() -> None:
+    headers = [*ROOT.glob("cpp/*/include/quasilpv/*.hpp")]
+    assert headers
+    assert [path.name for path in headers if not re.match(r"// \S", path.read_text(encoding="utf-8"))] == []
+
+
 # ---- the site --------------------------------------------------------------------------------------------------------
 
 
