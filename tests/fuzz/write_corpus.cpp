@@ -1,0 +1,49 @@
+// write_corpus FOLDER: the seeds of the fuzzers, one artifact of every law and one message of every type.
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "../cpp/artifact_fixture.hpp"
+#include "quasilpv/messages.hpp"
+
+namespace {
+
+using namespace quasilpv;           // NOLINT(google-build-using-namespace): this file is the program
+using namespace quasilpv::testing;  // NOLINT(google-build-using-namespace)
+
+void write(const std::filesystem::path& path, const std::string& bytes) {
+  std::filesystem::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+template <class Message>
+std::string message_seed(char channel) {
+  Message message{};
+  message.session = 42;
+  message.artifact_hash = -7;
+  if constexpr (!std::is_same_v<Message, event_v1>) {
+    message.joints = 3;
+  } else {
+    message.source = static_cast<std::int32_t>(Side::kOperator);
+  }
+  Packet packet;
+  encode(message, packet);
+  return channel + std::string(packet.bytes.begin(), packet.bytes.begin() + packet.size);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    return 2;
+  }
+  const std::filesystem::path folder = argv[1];
+  for (const char* kind : kLawKinds) {
+    const Json artifact = artifact_table(kind, 1);
+    write(folder / "artifact_json" / kind, json_twin(artifact));
+    write(folder / "artifact_cbor" / kind, cbor_twin(artifact));
+  }
+  write(folder / "message" / "measurement", message_seed<measurement_v1>(0));
+  write(folder / "message" / "command", message_seed<command_v1>(1));
+  write(folder / "message" / "event", message_seed<event_v1>(2));
+}
