@@ -126,6 +126,7 @@ def test_the_commands_of_a_page_run_in_their_order(name: str, tmp_path: Path, mo
 def test_every_line_of_a_console_block_is_run_or_listed_with_a_reason() -> None:
     lines = [line for page in PAGES for line in console_lines(page)]
     assert [line for line in lines if not line.startswith("design ") and not is_skipped(line)] == []
+    assert [reason for reason in NOT_RUN if not any(line.startswith(reason) for line in lines)] == []
 
 
 @pytest.mark.parametrize(
