@@ -29,6 +29,7 @@ from quasilpv.scenarios import Sensors, build_scenario
 from quasilpv.synthesis import Specification
 from quasilpv.systems.registry import robot, robots
 from quasilpv.telemetry import LOG_NAME, Event, RunLog, latest_log, read_events, read_log, write_events
+from quasilpv.telemetry.codes import event_in_words
 from quasilpv.telemetry.mcap_export import as_json, json_schema
 from quasilpv.telemetry.message_types import CHANNELS, message_type, parse_definition
 from quasilpv.telemetry.replay import replay
@@ -307,8 +308,25 @@ def test_when_a_log_is_inspected_expect_counts_rates_and_the_hash(
     telemetry = info["channels"]["QLPV_TELEMETRY"]
     assert (telemetry["messages"], telemetry["missing"], telemetry["refused"]) == (SAMPLES, 0, 0)
     assert telemetry["rate"] == pytest.approx(1000.0)
+    said = [(0, "controller started"), (0, "plant started"), (299, "plant ended"), (299, "controller ended")]
+    assert [(event["seq"], event["event"]) for event in info["events"]] == said
     assert run(["log", "info", str(tracked[1])]) == 0
     assert artifact.hash in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("source", "code", "cause", "words"),
+    [
+        (1, 3, 5, "controller fault: premise outside its box"),
+        (1, 2, 6, "controller ended: stop requested"),
+        (3, 4, 0, "operator reset"),
+        (9, 0, 77, "code 9 code 0: code 77"),
+    ],
+)
+def test_an_event_is_told_in_words(source: int, code: int, cause: int, words: str) -> None:
+    (event,) = message_type("event_v1").new(1)
+    event["source"], event["code"], event["detail"][0] = source, code, cause
+    assert event_in_words(event) == words
 
 
 def test_when_figures_are_drawn_from_a_log_expect_those_of_the_run(

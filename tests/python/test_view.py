@@ -258,6 +258,24 @@ def test_the_page_is_served_on_the_loopback_interface_only_and_follows_its_clock
     assert page.url.startswith(f"http://{HOST}:")
 
 
+def test_when_a_live_run_goes_on_expect_the_page_at_its_end_until_it_is_paused(
+    sender: Telemetry, live: LiveMotion, playback: Playback
+) -> None:
+    sender.send(slice(0, 50))
+    page = Page(playback.with_motion(polled(live, 50)), 0, live)
+    try:
+        for playing, end_s in ((True, 0.099), (False, 0.149)):
+            page.player.playing = playing
+            rows = round(1e3 * end_s) + 1
+            sender.send(slice(rows - 50, rows))
+            polled(live, rows)
+            page.step(1.0)
+            assert page.player.end_s == pytest.approx(end_s)
+            assert page.player.time_s == pytest.approx(0.099)
+    finally:
+        page.close()
+
+
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [

@@ -44,6 +44,8 @@ Examples:
   design track serial-square serial-circle
   design animate serial-square fivebar-spiral
   design hil serial-square --real-time
+  design log info LAST
+  design view --log LAST
   design solve ex-I.1 --condition II.6 --set b=2.5
   design boundary ex-I.1 --condition II.6 --over b=0:30
   design region ex-I.1 --condition II.6 --x a=-8:8:17 --y b=-20:20:41

@@ -16,6 +16,7 @@ from quasilpv.errors import ClaimError, InputError
 from quasilpv.experiments.logged import logged_result
 from quasilpv.figures.gallery import write_gallery
 from quasilpv.telemetry import RunLog
+from quasilpv.telemetry.codes import event_in_words
 from quasilpv.telemetry.log import ARTIFACT, HEADER, Messages
 from quasilpv.telemetry.mcap_export import write_mcap
 from quasilpv.telemetry.replay import replay
@@ -63,12 +64,13 @@ def log_command(
 def _info(log: RunLog, _: Path | None, json: bool) -> None:
     about, channels = _about(log), _channels(log)
     if json:
-        print_json({**about, "channels": channels, "foreign": dict(log.foreign)})
+        print_json({**about, "channels": channels, "events": _events(log), "foreign": dict(log.foreign)})
         return
     print_table(log.source, ("", ""), [(name, str(value)) for name, value in about.items() if value is not None], 2)
     columns = ("channel", "messages", "rate\nHz", "samples", "missing", "repeated", "refused")
     rows = [(name, *(_cell(entry[key.split("\n")[0]]) for key in columns[1:])) for name, entry in channels.items()]
     print_table("channels", columns, rows)
+    print_table("events", ("sample", "event"), [(str(event["seq"]), event["event"]) for event in _events(log)])
 
 
 def _about(log: RunLog) -> dict[str, Any]:
@@ -96,6 +98,11 @@ def _channels(log: RunLog) -> dict[str, dict[str, Any]]:
         }
         for name, messages in log.channels.items()
     }
+
+
+def _events(log: RunLog) -> list[dict[str, Any]]:
+    """Who said what at which sample, in the order of the log."""
+    return [{"seq": int(record["seq"]), "event": event_in_words(record)} for record in log["event"].records]
 
 
 def _samples(name: str, messages: Messages) -> dict[str, int | None]:

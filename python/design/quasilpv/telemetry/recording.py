@@ -14,6 +14,7 @@ from quasilpv import _runtime
 from quasilpv.artifact import Artifact
 from quasilpv.artifact.canonical import canonical_json
 from quasilpv.scenarios import Scenario
+from quasilpv.telemetry.codes import CONTROLLER, ENDED, PLANT, RUNNING, STARTED
 from quasilpv.telemetry.event_log import Event, write_events
 from quasilpv.telemetry.log import ARTIFACT, HEADER, SCENARIO, TRAJECTORY, RunHeader, hash_prefix
 from quasilpv.telemetry.message_types import Records, channel_type
@@ -22,10 +23,6 @@ from quasilpv.trajectories import Trajectory
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 Columns: TypeAlias = Mapping[str, FloatArray]
 """Quantities of a run by name, (N,) or (N, n), as the run-time side names them in its records."""
-
-CONTROLLER, PLANT = 1, 2
-STARTED, ENDED = 1, 2
-RUNNING = 2
 
 _SAME_NAME = (
     "reference_angle_rad",

@@ -11,10 +11,8 @@ import numpy.typing as npt
 from quasilpv import _runtime
 from quasilpv.artifact.canonical import canonical_json
 from quasilpv.errors import InputError
+from quasilpv.telemetry.codes import FAULT
 from quasilpv.telemetry.log import RunLog
-
-FAULT = 4
-"""State of a controller that no longer commands what its law says."""
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -55,7 +53,7 @@ def replay(log: RunLog) -> Replay:
     compared, difference = 0, None
     for k, (angle, speed) in enumerate(measured):
         command = commands.get(k)
-        if command is not None and command["state"] == FAULT:
+        if command is not None and command["state"] == FAULT:  # it no longer commands what its law says
             return Replay(k, compared, difference, k)
         report = controller.step(angle[:n], *trajectory.evaluate(k * artifact.sample_period_s), speed[:n], seq=k)
         if command is None:

@@ -69,12 +69,12 @@ class Page:
         """Let time pass, do what was clicked, and draw what has changed."""
         while not self._actions.empty():
             self._actions.get()()
+        self._since_plots_s += elapsed_s
         if self._live is not None:
             self._grow(self._live)
         self.player.advance(elapsed_s if self._live is None else 0.0)
         instant = self._playback.at(self.player.time_s)
         shown = (id(self._playback), instant.sample, self.player.playing)
-        self._since_plots_s += elapsed_s
         if shown == self._shown and self._since_plots_s < PLOT_PERIOD_S:
             return
         with self._server.atomic():
@@ -83,7 +83,8 @@ class Page:
 
     def close(self) -> None:
         """Serve no more."""
-        self._server.stop()
+        with _quiet():
+            self._server.stop()
 
     # ---- drawing ---------------------------------------------------------------------------------------------------
 
@@ -200,7 +201,7 @@ def _serve(port: int) -> viser.ViserServer:
         except OSError as error:
             raise InputError("command line", "--port", port, f"a free port of {HOST}") from error
         free_port = int(probe.getsockname()[1])
-    with contextlib.redirect_stdout(io.StringIO()):
+    with _quiet():
         return viser.ViserServer(host=HOST, port=free_port, verbose=False)
 
 
@@ -208,6 +209,11 @@ def _legend(joints: int) -> str:
     """The colours of the joints, which all plots share; premises have the same in their order."""
     names = (f'<span style="color:{JOINT_COLOURS[k]}">&#9632; joint {k + 1}</span>' for k in range(joints))
     return f'<div style="font-size:0.8em; padding:0 1em">{" &nbsp; ".join(names)}</div>'
+
+
+def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
+    """Keeps what the viewer says of its server from standard output."""
+    return contextlib.redirect_stdout(io.StringIO())
 
 
 def _status(instant: Instant, exaggeration: float) -> str:

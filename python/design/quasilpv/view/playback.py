@@ -17,12 +17,12 @@ from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.logged import logged_run
 from quasilpv.systems.mechanism import PlanarMechanism
 from quasilpv.telemetry import RunLog
+from quasilpv.telemetry.codes import STATES, word
 from quasilpv.telemetry.message_types import Records
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 
-STATES = ("init", "ready", "running", "degraded", "fault")
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0)
 
 
@@ -38,7 +38,7 @@ class Motion:
         estimate: (N, n) disturbance as the law compensates it; rad/s^2 for acceleration-level laws, N m for the others.
         disturbance: (N, n) the true one in the same unit; NaN where it is not known.
         weight: (N, p) of the upper vertex of each premise, ``(z - lower) / (upper - lower)``, in [0, 1].
-        state: (N,) index into `STATES`.
+        state: (N,) of the controller, index into `codes.STATES`.
         flags: (N,) fault bits; 0 is healthy.
         step_us: (N,) time of the control step; 0 where none was measured.
     """
@@ -166,7 +166,7 @@ class Playback:
             links_m=self.mechanism.skeleton(self.motion.angle_rad[k]),
             reference_links_m=self.mechanism.skeleton(self.motion.reference_angle_rad[k]),
             error_m=self.tool_m[k] - self.reference_tool_m[k],
-            state=STATES[int(self.motion.state[k])] if 0 <= self.motion.state[k] < len(STATES) else "unknown",
+            state=word(STATES, int(self.motion.state[k])),
             flags=int(self.motion.flags[k]),
         )
 

@@ -1,0 +1,37 @@
+"""Fields of messages that hold codes, in words (``docs/reference/messages.md``)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+STATES = ("init", "ready", "running", "degraded", "fault")
+RUNNING, FAULT = STATES.index("running"), STATES.index("fault")
+
+SOURCES = ("", "controller", "plant", "operator")
+CONTROLLER, PLANT = SOURCES.index("controller"), SOURCES.index("plant")
+
+EVENTS = ("", "started", "ended", "fault", "reset")
+STARTED, ENDED = EVENTS.index("started"), EVENTS.index("ended")
+
+FAULT_CAUSES = (
+    "",
+    "measurement lost",
+    "plant silent",
+    "deadline overrun",
+    "foreign messages",
+    "premise outside its box",
+    "stop requested",
+)
+
+
+def word(words: Sequence[str], code: int) -> str:
+    """The word of a code, or the code itself if it has none."""
+    return words[code] if 0 <= code < len(words) and words[code] else f"code {code}"
+
+
+def event_in_words(event: Any) -> str:
+    """Who says what in a record of `event_v1`, and why if it is about a fault."""
+    said = f"{word(SOURCES, int(event['source']))} {word(EVENTS, int(event['code']))}"
+    cause = int(event["detail"][0])
+    return f"{said}: {word(FAULT_CAUSES, cause)}" if cause else said
