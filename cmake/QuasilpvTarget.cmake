@@ -1,5 +1,9 @@
-# One place for the compile options of every target of the project.
+# One place for the compile options of every target of the project, and for where it is installed.
 #
+# Installed components: `python` is what the wheel takes, `runtime` the executables, `development` what
+# find_package(quasilpv) needs (cmake/quasilpvConfig.cmake.in).
+include(GNUInstallDirs)
+
 # Warnings are errors. -ffast-math is never used: it makes isfinite(NaN) true. -ffp-contract=off keeps the
 # arithmetic of the step the same on machines with and without fused multiply-add, so that runs are
 # bit-reproducible.
@@ -13,9 +17,23 @@ function(quasilpv_executable name source library)
   add_executable(${name} ${source})
   target_link_libraries(${name} PRIVATE ${library} CLI11::CLI11)
   quasilpv_target(${name})
+  set_target_properties(${name} PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
+  install(TARGETS ${name} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
   if(SKBUILD)
-    install(TARGETS ${name} DESTINATION ${SKBUILD_SCRIPTS_DIR})
-  else()
-    install(TARGETS ${name} DESTINATION bin)
+    install(TARGETS ${name} DESTINATION ${SKBUILD_SCRIPTS_DIR} COMPONENT python)
   endif()
+endfunction()
+
+# A library of the project, quasilpv::<name> here and for those who find_package(quasilpv); its public headers are the
+# folder include/ beside it.
+function(quasilpv_library target name)
+  add_library(quasilpv::${name} ALIAS ${target})
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>
+                                              $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_compile_features(${target} PUBLIC cxx_std_17)
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERSION ${PROJECT_VERSION}
+                                             SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  quasilpv_target(${target})
+  install(TARGETS ${target} EXPORT quasilpvTargets DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
+  install(DIRECTORY include/quasilpv DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
 endfunction()

@@ -1,37 +1,53 @@
-"""The wheel is complete: what it needs is declared, and what it ships runs without the source tree."""
+"""What is installed is complete: a wheel that does the main job alone, a C++ package that other projects find."""
 
+import json
+import os
+import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from quasilpv import _runtime
+from quasilpv.experiments.designs import kept_design
+from quasilpv.experiments.track import TrackingExperiment, write_run_files
+from quasilpv.scenarios import Sensors
+from quasilpv.synthesis import Specification
+
 ROOT = Path(__file__).parents[2]
+BUILT = ROOT / "build" / "release"
 
 
 def run(*command: str | Path, cwd: Path) -> str:
-    """Output of a command that must succeed; its whole output is shown when it does not."""
-    result = subprocess.run([str(word) for word in command], cwd=cwd, capture_output=True, text=True, check=False)
+    """Output of a command that must succeed, without the source tree on Python's path; all it said if it does not."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    words = [str(word) for word in command]
+    result = subprocess.run(words, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
     assert result.returncode == 0, f"{command}\n{result.stdout}\n{result.stderr}"
     return result.stdout
+
+
+def test_every_place_that_says_the_version_says_the_same() -> None:
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    assert f"project(quasilpv VERSION {version} " in (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    minor = version.rpartition(".")[0]
+    downstream = (ROOT / "examples/downstream/CMakeLists.txt").read_text(encoding="utf-8")
+    assert f"find_package(quasilpv {minor} REQUIRED)" in downstream
+
+
+# ---- the wheel -------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def clean_environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An environment that holds the wheel and what its metadata asks for, nothing else."""
     folder = tmp_path_factory.mktemp("packaging")
-    run(
-        sys.executable,
-        "-m",
-        "pip",
-        "wheel",
-        "--no-build-isolation",
-        "--no-deps",
-        "--wheel-dir",
-        folder,
-        ROOT,
-        cwd=folder,
-    )
+    build = ("-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", folder, ROOT)
+    run(sys.executable, *build, cwd=folder)
     [wheel] = folder.glob("quasilpv-*.whl")
     run(sys.executable, "-m", "venv", folder / "venv", cwd=folder)
     run(folder / "venv/bin/python", "-m", "pip", "install", wheel, cwd=folder)
@@ -54,3 +70,70 @@ def test_when_the_wheel_is_installed_alone_expect_the_commands_to_run(clean_envi
         assert name in listing
     for executable in ("qlpv-controller", "qlpv-simulator"):
         assert "--help" in run(clean_environment / "bin" / executable, "--help", cwd=clean_environment)
+
+
+@pytest.mark.full
+def test_when_the_wheel_is_installed_alone_expect_no_headers_and_no_archives_in_it(clean_environment: Path) -> None:
+    [wheel] = clean_environment.parent.glob("quasilpv-*.whl")
+    listed = run(sys.executable, "-m", "zipfile", "--list", wheel, cwd=clean_environment)
+    assert "quasilpv/_runtime" in listed
+    assert not any(suffix in listed for suffix in (".hpp", ".a ", ".cmake"))
+
+
+@pytest.mark.full
+def test_when_the_wheel_is_installed_alone_expect_the_demo_to_do_the_main_job(
+    clean_environment: Path, tmp_path: Path
+) -> None:
+    command = clean_environment / "bin/design"
+    made = json.loads(run(command, "demo", "--json", "-o", "demo", cwd=tmp_path))
+    assert made["verification"]["certificate"]["verified"] is True
+    best = {run["scenario"]: run for run in made["runs"] if run["controller"] == "dob-acceleration"}
+    assert set(best) == {"serial-square", "serial-circle"}
+    for row in made["runs"]:
+        if row["controller"] in {"pid", "ctc", "ctc-dob"}:
+            assert best[row["scenario"]]["rms_x_m"] < row["rms_x_m"] / 10
+        assert (tmp_path / "demo" / row["scenario"] / "comparison.png").stat().st_size > 0
+    assert "verified" in run(command, "verify", made["artifact"]["json"], cwd=tmp_path)
+
+
+# ---- the C++ package -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def downstream(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The program of examples/downstream, built away from the source tree against an installation of its own."""
+    folder = tmp_path_factory.mktemp("downstream")
+    install = ("--install", BUILT, "--component", "development", "--prefix", folder / "prefix")
+    run("cmake", *install, cwd=folder)
+    shutil.copytree(ROOT / "examples/downstream", folder / "source")
+    search = f"-DCMAKE_PREFIX_PATH={folder / 'prefix'}"
+    run("cmake", "-S", folder / "source", "-B", folder / "build", "-G", "Ninja", search, cwd=folder)
+    run("cmake", "--build", folder / "build", cwd=folder)
+    assert str(ROOT) not in "".join(path.read_text() for path in (folder / "prefix").rglob("*.cmake"))
+    return folder / "build" / "closed_loop"
+
+
+@pytest.mark.full
+def test_when_another_project_runs_the_loop_of_the_installed_library_expect_the_run_of_the_bindings(
+    downstream: Path, tmp_path: Path
+) -> None:
+    experiment = TrackingExperiment.registered("serial-square")
+    artifact = kept_design("arm3", "pid", Specification(), folder=tmp_path / "cache")
+    files = write_run_files(tmp_path, experiment, artifact, plant="perturbed", sensors=Sensors())
+    said = run(downstream, files.artifact, files.trajectory, files.scenario, cwd=tmp_path)
+    columns = _runtime.run_closed_loop(
+        _runtime.Artifact.load(str(files.artifact)),
+        _runtime.Trajectory.load(str(files.trajectory)),
+        _runtime.Scenario.load(str(files.scenario)),
+    )
+    worst = float(np.max(np.abs(columns["angle_rad"] - columns["reference_angle_rad"])))
+    assert f"{columns['time_s'].size} samples" in said
+    assert float(said.split()[-2]) == worst
+
+
+@pytest.mark.full
+def test_when_the_downstream_program_is_given_a_missing_file_expect_one_line_and_exit_2(downstream: Path) -> None:
+    done = subprocess.run([downstream, "a", "b", "c"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("closed_loop: a: ")
+    assert done.stderr.count("\n") == 1
