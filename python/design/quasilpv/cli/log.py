@@ -92,7 +92,7 @@ def _channels(log: RunLog) -> dict[str, dict[str, Any]]:
         name: {
             "messages": int(messages.records.size),
             "rate": messages.rate_hz,
-            **_samples(name, messages),
+            **_samples(name, messages, log.last_seq),
             "refused": sum(messages.refused.values()),
             "refused_by_reason": dict(messages.refused),
         }
@@ -105,11 +105,11 @@ def _events(log: RunLog) -> list[dict[str, Any]]:
     return [{"seq": int(record["seq"]), "event": event_in_words(record)} for record in log["event"].records]
 
 
-def _samples(name: str, messages: Messages) -> dict[str, int | None]:
-    """How the messages cover the samples; nothing of events, which come when something happens."""
-    if name == "QLPV_EVENT":
+def _samples(name: str, messages: Messages, last_seq: int) -> dict[str, int | None]:
+    """How the messages cover the samples; nothing of events, and of a truth that is not known."""
+    if name == "QLPV_EVENT" or (name == "QLPV_TRUTH" and not messages.records.size):
         return {"samples": None, "missing": None, "repeated": None}
-    return {"samples": int(messages.samples.size), "missing": messages.missing, "repeated": messages.repeated}
+    return {"samples": int(messages.samples.size), "missing": messages.missing(last_seq), "repeated": messages.repeated}
 
 
 def _cell(value: float | None) -> str:

@@ -11,6 +11,8 @@ from quasilpv.errors import InputError, TransportError
 from quasilpv.telemetry.message_types import CHANNELS, channel_type
 
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
+_RECEIVE_BUFFER_BYTES = 4 << 20
+"""Asked of the kernel, whose default holds a hundred messages: fewer than a busy machine lets pile up."""
 _URL = re.compile(r"udpm://\d+(\.\d+){3}:\d+\?ttl=0")
 
 
@@ -26,7 +28,7 @@ def listen(url: str, hear: Callable[[str, bytes], None]) -> lcm.LCM:
     if not _URL.fullmatch(url):
         raise InputError("command line", "--url", url, f"udpm://ADDRESS:PORT?ttl=0, e.g. {DEFAULT_URL}")
     try:
-        wire = lcm.LCM(url)
+        wire = lcm.LCM(f"{url}&recv_buf_size={_RECEIVE_BUFFER_BYTES}")
     except RuntimeError as error:
         raise TransportError(f"{url}: {error}") from error
 

@@ -92,10 +92,9 @@ class Messages:
         """Messages that repeat a ``seq``."""
         return int(self.records.size - self.samples.size)
 
-    @property
-    def missing(self) -> int:
-        """Values of ``seq`` that are absent between 0 and the largest."""
-        return int(self.samples["seq"][-1] + 1 - self.samples.size) if self.samples.size else 0
+    def missing(self, last_seq: int) -> int:
+        """How many of the samples 0 to ``last_seq`` no message is about."""
+        return int(last_seq + 1 - np.count_nonzero(self.samples["seq"] <= last_seq))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +146,12 @@ class RunLog:
         """The experiment. InputError: missing or damaged."""
         source = f"{self.source}: {SCENARIO}"
         return Scenario.from_document(parse_strict_json(self._document(SCENARIO), source), source)
+
+    @property
+    def last_seq(self) -> int:
+        """The last sample that any message is about, events apart; -1 if there is none."""
+        sampled = (messages.samples["seq"] for name, messages in self.channels.items() if name != "QLPV_EVENT")
+        return max((int(seq[-1]) for seq in sampled if seq.size), default=-1)
 
     @property
     def duration_s(self) -> float:

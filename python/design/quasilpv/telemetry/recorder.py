@@ -17,6 +17,7 @@ from quasilpv.telemetry.message_types import channel_type
 from quasilpv.telemetry.recording import Columns, RunDocuments, messages
 
 _POLL_MS = 20
+_LINGER_MS = 250
 
 
 class Recorder:
@@ -63,7 +64,9 @@ class Recorder:
         self._heard.append(Event(_now_us(), channel, data))
 
     def _listen(self) -> None:
-        while self._wire.handle_timeout(_POLL_MS) or not self._stopping.is_set():
+        while not self._stopping.is_set():
+            self._wire.handle_timeout(_POLL_MS)
+        while self._wire.handle_timeout(_LINGER_MS):  # what was sent last is still on its way
             pass
 
     def _truth_events(self) -> Iterator[Event]:

@@ -22,7 +22,8 @@ HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
 PLOT_PERIOD_S = 0.12
 _PANEL_WIDTH = 400
-_PLOT_HEIGHT = 128
+_PLOT_HEIGHT = 104
+_AXES = (uplot.Axis(size=26), uplot.Axis(size=54))
 _PADDING = (6, 14, 0, 0)
 _TIME_STEPS = 1000
 
@@ -175,6 +176,7 @@ class Page:
             legend=uplot.Legend(show=False),
             height=_PLOT_HEIGHT,
             padding=_PADDING,
+            axes=_AXES,
         )
 
     def _add_histogram(self) -> viser.GuiUplotHandle | None:
@@ -189,6 +191,7 @@ class Page:
             legend=uplot.Legend(show=False),
             height=_PLOT_HEIGHT,
             padding=_PADDING,
+            axes=_AXES,
         )
 
 
