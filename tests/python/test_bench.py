@@ -23,7 +23,7 @@ from quasilpv.studies import Verdict
 
 ROOT = Path(__file__).parents[2]
 TOOLS = ROOT / "tools" / "bench"
-LAYERS = ("step", "plant", "lmi", "transport")
+LAYERS = ("step", "plant", "lmi", "transport", "premises", "latency", "soak")
 
 
 def run_tool(layer: str, *options: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -78,6 +78,28 @@ def test_quantiles_of_the_step_are_ordered() -> None:
     assert p50 <= p99 <= p999
 
 
+def test_a_dense_block_is_the_competitor_of_the_same_number_of_premises() -> None:
+    rows = {row["name"]: row for row in quick_rows("premises")}
+    for premises in (1, 3):
+        collapsed = rows[f"collapsed, {premises} premises, {2 * premises} vertices"]
+        assert collapsed["against"] == f"dense, {premises} premises, {2**premises} vertices"
+        assert collapsed["against"] in rows
+
+
+def test_latencies_are_there_without_privilege_and_their_quantiles_are_ordered() -> None:
+    values = {row["name"]: row["value"] for row in quick_rows("latency")}
+    for name in ("wake-up", "step", "LCM round trip"):
+        p50, p99, p999 = (values[f"{name} {label}, without privilege"] for label in ("p50", "p99", "p99.9"))
+        assert p50 <= p99 <= p999
+
+
+def test_the_soak_observed_something() -> None:
+    done = run_tool("soak")
+    assert done.returncode == 0, done.stderr
+    assert "6 s simulated" in done.stderr
+    assert "lost 0" not in done.stderr
+
+
 def test_the_map_is_compared_with_both_ways_of_writing_it_in_cvxpy_with_and_without_the_exact_check() -> None:
     beside = {(row["name"].partition(": ")[2].partition(",")[0], row["against"]) for row in quick_rows("lmi")}
     for way in ("certified", "solver only"):
@@ -107,7 +129,7 @@ def test_when_the_verdict_is_known_expect_every_other_solver_to_find_it(load: Ca
         assert decide_with(load(compiled.layout), compiled) is verdict
 
 
-@pytest.mark.parametrize("layer", ["step", "plant", "transport"])
+@pytest.mark.parametrize("layer", ["step", "plant", "transport", "premises", "soak"])
 def test_when_the_programs_are_not_built_expect_exit_2_and_one_line_that_names_the_folder(
     layer: str, tmp_path: Path
 ) -> None:
