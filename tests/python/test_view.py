@@ -264,8 +264,10 @@ def test_when_a_live_run_goes_on_expect_the_page_at_its_end_until_it_is_paused(
     sender.send(slice(0, 50))
     page = Page(playback.with_motion(polled(live, 50)), 0, live)
     try:
-        for playing, end_s in ((True, 0.099), (False, 0.149)):
-            page.player.playing = playing
+        for paused, end_s in ((False, 0.099), (True, 0.149)):
+            page.step(1.0)
+            assert page.player.playing
+            page.player.playing = not paused
             rows = round(1e3 * end_s) + 1
             sender.send(slice(rows - 50, rows))
             polled(live, rows)

@@ -71,9 +71,10 @@ class Page:
         while not self._actions.empty():
             self._actions.get()()
         self._since_plots_s += elapsed_s
-        if self._live is not None:
+        if self._live is None:
+            self.player.advance(elapsed_s)
+        else:
             self._grow(self._live)
-        self.player.advance(elapsed_s if self._live is None else 0.0)
         instant = self._playback.at(self.player.time_s)
         shown = (id(self._playback), instant.sample, self.player.playing)
         if shown == self._shown and self._since_plots_s < PLOT_PERIOD_S:

@@ -53,6 +53,7 @@ class RobotScene:
         self._shadow = _Bars(scene, "reference robot", links.shape[0], 0.6 * width, (SHADOW_COLOUR, 0.35))
         self._scene = scene
         self._line_width = 0.12 * width
+        self._shows_magnified = True
         self._place_camera(server, playback)
         self.show_paths(playback)
         self.show_shadow = self.exaggeration == 1.0
@@ -83,16 +84,19 @@ class RobotScene:
         self._rows = rows
         reference, tool = playback.reference_tool_m[rows], playback.tool_m[rows]
         self.exaggeration = exaggeration(tool - reference, reference)
-        # One behind the other, seen from where the camera starts: the reference does not cover the way of the tool.
-        self._path("reference path", reference, REFERENCE_COLOUR, 2.0)
-        self._tool = self._path("tool path", tool, TOOL_COLOUR, 1.0)
+        # One behind the other, seen from where the camera starts: none covers the next.
+        self._path("reference path", reference, REFERENCE_COLOUR, 2.0, behind=2.0)
+        self._tool = self._path("tool path", tool, TOOL_COLOUR, 1.0, behind=0.0)
         magnified = reference + self.exaggeration * (tool - reference)
-        self._magnified = self._path("tool path, error magnified", magnified, ERROR_COLOUR, 1.0)
+        self._magnified = self._path("tool path, error magnified", magnified, ERROR_COLOUR, 1.0, behind=-1.0)
+        self._magnified.visible = self._shows_magnified
         self._segments = [(self._tool, _segments(tool)), (self._magnified, _segments(magnified))]
 
-    def _path(self, name: str, points: FloatArray, colour: Colour, widths: float) -> viser.LineSegmentsHandle:
+    def _path(
+        self, name: str, points: FloatArray, colour: Colour, widths: float, *, behind: float
+    ) -> viser.LineSegmentsHandle:
+        place = (0.0, behind * self._line_width, 0.0)
         width = widths * self._line_width
-        place = (0.0, 2.0 * (width - self._line_width), 0.0)
         return self._scene.add_line_segments(
             f"/paths/{name}", _segments(points), colour, thickness=width, position=place
         )
@@ -108,7 +112,7 @@ class RobotScene:
     def set_visible(self, *, shadow: bool, magnified: bool) -> None:
         """Show or hide the robot on its reference, and the magnified error."""
         self._shadow.root.visible = shadow
-        self._magnified.visible = magnified
+        self._shows_magnified = self._magnified.visible = magnified
 
 
 @dataclass
