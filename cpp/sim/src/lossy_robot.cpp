@@ -68,7 +68,7 @@ class LossyRobot::Wire {
 
   Parcel take_next() {
     ++counters_.delivered;
-    return std::move(on_their_way_.extract(on_their_way_.begin()).mapped());
+    return on_their_way_.extract(on_their_way_.begin()).mapped();
   }
 
   WireCounters counters() const noexcept {
