@@ -23,7 +23,7 @@ from quasilpv.studies import Verdict
 
 ROOT = Path(__file__).parents[2]
 TOOLS = ROOT / "tools" / "bench"
-LAYERS = ("step", "plant", "lmi", "transport", "premises", "latency", "soak")
+LAYERS = ("step", "plant", "lmi", "transport", "premises", "latency", "soak", "model", "certificate", "footprint")
 
 
 def run_tool(layer: str, *options: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -40,13 +40,13 @@ def quick_rows(layer: str) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("layer", LAYERS)
-def test_every_row_is_a_positive_duration_with_a_name_of_its_own(layer: str) -> None:
+def test_every_row_is_a_positive_cost_with_a_name_of_its_own(layer: str) -> None:
     rows = quick_rows(layer)
     assert rows
     assert len({row["name"] for row in rows}) == len(rows)
     for row in rows:
         assert set(row) == {"name", "value", "unit", "against", "ratio"}
-        assert row["unit"] in {"ns", "us", "ms", "s"}
+        assert row["unit"] in {"ns", "us", "ms", "s", "MiB", "1"}
         assert math.isfinite(row["value"])
         assert row["value"] > 0
 

@@ -23,21 +23,21 @@ from quasilpv.errors import QuasilpvError
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = ROOT / "out" / "bench"
-HEADER = "ratio = competitor / ours: above 1 ours is the faster"
+HEADER = "ratio = competitor / ours: above 1 ours is the cheaper"
 
-Unit = Literal["ns", "us", "ms", "s"]
+Unit = Literal["ns", "us", "ms", "s", "MiB", "1"]
 
 
 @dataclass(frozen=True)
 class Row:
-    """One measured duration.
+    """One measured cost: a duration, memory, or a count.
 
     Attributes:
         name: what was measured.
-        value: how long it took, in `unit`.
-        unit: ns, us, ms or s.
+        value: how much of `unit` it took.
+        unit: ns, us, ms or s; MiB; 1 of counts.
         against: the competitor measured in the same run, None if there is none.
-        ratio: duration of the competitor over `value`, None if there is no competitor.
+        ratio: cost of the competitor over `value`, None if there is no competitor.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Row:
 
 
 def row(name: str, value: float, unit: Unit, against: tuple[str, float] | None = None) -> Row:
-    """The row of a duration beside that of a competitor, (its name, its duration in the same unit)."""
+    """The row of a cost beside that of a competitor, (its name, its cost in the same unit)."""
     return Row(name, value, unit) if against is None else Row(name, value, unit, against[0], against[1] / value)
 
 
@@ -57,7 +57,7 @@ class Report:
     """Outcome of one benchmark tool.
 
     Attributes:
-        rows: the durations.
+        rows: the costs.
         notes: what a reader must know to judge them: errors of what was timed, how, what could not be measured and why.
         packages: Python distributions whose version matters.
     """
@@ -114,11 +114,17 @@ def present(layer: str, report: Report, *, as_json: bool) -> None:
 
 def print_table(layer: str, rows: Sequence[Row]) -> None:
     """Print rows on stdout, never narrower than their content when stdout is not a terminal."""
-    table = Table(title=f"{layer}: {HEADER}", title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for heading in ("", "value", "unit", "ratio", "competitor"):
-        table.add_column(heading, justify="right" if heading in {"value", "ratio"} else "left", no_wrap=True)
-    for r in rows:
-        table.add_row(r.name, f"{r.value:.4g}", r.unit, "" if r.ratio is None else f"{r.ratio:.3g}", r.against)
+    cells = [(r.name, f"{r.value:.4g}", r.unit, "" if r.ratio is None else f"{r.ratio:.3g}", r.against) for r in rows]
+    print_cells(f"{layer}: {HEADER}", ("", "value", "unit", "ratio", "competitor"), cells)
+
+
+def print_cells(title: str, headings: Sequence[str], rows: Sequence[Sequence[str | None]]) -> None:
+    """Print a table on stdout; columns whose heading is of a number align right."""
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading in {"", "unit", "competitor"} else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
     Console(width=None if sys.stdout.isatty() else 160).print(table)
 
 
