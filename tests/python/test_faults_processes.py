@@ -38,14 +38,14 @@ REAL_TIME = ("--mode", "realtime")
 
 def require_held_then_braked(plant: dict[str, np.ndarray], last: int) -> None:
     """From the command of sample `last` on: that torque for 20 ms of plant time, then the opposite of motion."""
-    period = plant["time_s"][1]
-    held_until = plant["time_s"][last] + plant["command_delay_s"][last] + HOLD_S
+    start_ns, delay_ns = (np.rint(plant[name] * 1e9).astype(int) for name in ("time_s", "command_delay_s"))
+    held_until_ns = start_ns[last] + delay_ns[last] + round(HOLD_S * 1e9)
     for k in range(last + 1, len(plant["seq"])):
-        if plant["command_delay_s"][k] >= 0.0:
+        if delay_ns[k] >= 0:
             return
-        if plant["time_s"][k] + period <= held_until:
+        if start_ns[k] + start_ns[1] <= held_until_ns:
             np.testing.assert_array_equal(plant["torque_nm"][k], plant["torque_nm"][last])
-        elif plant["time_s"][k] >= held_until:
+        elif start_ns[k] >= held_until_ns:
             assert np.all(plant["torque_nm"][k] * plant["speed_rad_s"][k] <= 0.0)
 
 

@@ -16,7 +16,7 @@ from quasilpv.synthesis import CONTROLLERS
 
 WRONG_USES = {
     "trakc serial-square": f"command line: verb: got trakc, expected one of {', '.join(VERBS)}; did you mean track?",
-    "list --colour": "command line: option: got --colour, expected one of --json, -h, --help (design list --help)",
+    "list --colour": "command line: option: got --colour, expected one of --json, --help, -h (design list --help)",
     "synth": "command line: ROBOT: got nothing, expected robot id, see design list (design synth --help)",
     "synth arm3 --rate-hz fast": "command line: --rate-hz: got fast, expected a number (design synth --help)",
     "synth arm9": "robots: robot: got arm9, expected one of arm2, arm3, arm2-upright, arm3-light, fivebar, "

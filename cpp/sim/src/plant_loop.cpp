@@ -6,6 +6,7 @@
 
 #include "quasilpv/realtime.hpp"
 #include "quasilpv/run_columns.hpp"
+#include "quasilpv/watchdog.hpp"
 
 namespace quasilpv {
 namespace {
@@ -63,6 +64,7 @@ class PlantRun {
         stop_(stop),
         period_ns_(to_nanoseconds(session.sample_period_s())),
         timeout_ns_(to_nanoseconds(settings.timeout_s)),
+        watchdog_(to_nanoseconds(settings.hold_s), period_ns_),
         last_heard_ns_(monotonic_ns()) {
     if (record != nullptr) {
       columns_.emplace(*record, session);
@@ -190,15 +192,14 @@ class PlantRun {
     return sample;
   }
 
-  /// The watchdog: what acts on the sample if no command arrived.
+  /// What acts on the sample if no command arrived.
   SampleTorque guard(const SampleTorque& sample) {
     report_.watchdog_at_end = false;
     if (sample.delay_s != kNoCommand) {
-      silent_s_ = session_.sample_period_s() - sample.delay_s;
+      watchdog_.command_at(to_nanoseconds(sample.delay_s));
       return sample;
     }
-    silent_s_ += session_.sample_period_s();
-    if (silent_s_ <= settings_.hold_s) {
+    if (!watchdog_.takes_over()) {
       return sample;
     }
     ++report_.watchdog_samples;
@@ -228,10 +229,10 @@ class PlantRun {
   std::optional<RunColumns> columns_;
   std::int64_t period_ns_;
   std::int64_t timeout_ns_;
+  Watchdog watchdog_;
   std::int64_t last_heard_ns_;
   std::int64_t sent_ns_ = 0;
   std::int64_t last_command_seq_ = -1;
-  double silent_s_ = 0.0;  // plant time since the torque in force arrived
   std::optional<PlantRunEnd> end_;
   PlantRunReport report_;
 };

@@ -34,7 +34,8 @@ def _parts(error: typer.TyperException, context: Any) -> tuple[str, str, str]:
     if parameter is not None and not getattr(error, "message", ""):
         return field, "nothing", _first_sentence(parameter.help) or "a value"
     if option is not None and hasattr(error, "possibilities"):
-        options = [name for known in context.command.get_params(context) for name in known.opts if name.startswith("-")]
+        declared = (parameter.opts for parameter in context.command.get_params(context))
+        options = [name for names in declared for name in sorted(names) if name.startswith("-")]  # -h and --help: a set
         return "option", option, one_of(options, option)
     if option is not None:
         return (option, "a value", "none") if "does not take" in str(error) else (option, "nothing", "a value")
