@@ -61,6 +61,34 @@ def test_when_an_option_has_no_value_or_a_wrong_one_expect_the_option_named(
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("reason", ["libsundials_ida.so.6: cannot open shared object file", "undefined symbol: init"])
+def test_when_the_compiled_module_cannot_be_loaded_expect_one_line_that_says_why_and_what_to_do(reason: str) -> None:
+    program = f"""
+import importlib.abc, sys
+class Unloadable(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == "quasilpv._runtime":
+            raise ImportError({reason!r})
+sys.meta_path.insert(0, Unloadable())
+from quasilpv.cli import main
+main()
+"""
+    command = [sys.executable, "-c", program, "track", "serial-square"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"error: installation: quasilpv._runtime: got {reason}, expected ")
+    assert "./tools/demo" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_when_something_else_cannot_be_imported_expect_it_not_blamed_on_the_compiled_module(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "quasilpv.cli.listing", None)
+    with pytest.raises(ImportError, match="listing"):
+        run(["list"])
+
+
 def test_when_many_names_are_known_expect_only_the_closest() -> None:
     many = [f"fig-{number}" for number in range(MOST_NAMES + 1)]
     assert one_of(many, "fgi-7").startswith("fig-7, ")

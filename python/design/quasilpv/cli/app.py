@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
 import typer
 
@@ -92,8 +93,8 @@ def run(arguments: Sequence[str]) -> int:
     """
     try:
         code = app(args=list(arguments), prog_name="design", standalone_mode=False)
-        if code == EXIT_INTERRUPTED:  # typer has swallowed the KeyboardInterrupt
-            return _fail("interrupted", EXIT_INTERRUPTED)
+        if code == EXIT_INTERRUPTED:
+            raise KeyboardInterrupt  # typer has swallowed it
         return code if isinstance(code, int) else 0
     except typer.TyperException as error:
         return _fail(str(usage_error(error)), 2)
@@ -102,6 +103,11 @@ def run(arguments: Sequence[str]) -> int:
         return _fail(str(error), next(codes, 1))
     except (KeyboardInterrupt, typer.Abort):
         return _fail("interrupted", EXIT_INTERRUPTED)
+    except ImportError:
+        unloadable = _unloadable_runtime()
+        if unloadable is None:
+            raise
+        return _fail(str(unloadable), 2)
     except BrokenPipeError:  # the reader of a pipe has left: nobody is there to be told
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -110,6 +116,17 @@ def run(arguments: Sequence[str]) -> int:
 def main() -> None:
     """Entry point of the command ``design``."""
     sys.exit(run(sys.argv[1:]))
+
+
+def _unloadable_runtime() -> InputError | None:
+    """Why the compiled module cannot be imported, and what to do about it; None if it can."""
+    name = "quasilpv._runtime"
+    try:
+        import_module(name)
+    except ImportError as error:
+        expected = "the compiled module and the libraries it links: run ./tools/demo in a clone, or install the wheel"
+        return InputError("installation", name, error, expected)
+    return None
 
 
 def _fail(message: str, code: int) -> int:
