@@ -20,7 +20,7 @@ from quasilpv.figures.constraint import constraint_figure
 from quasilpv.figures.side_by_side import disturbance_estimates, input_columns, speed_errors, tracking_columns
 from quasilpv.figures.stabilisation import regulation_figure, rolling_disc_figure
 from quasilpv.release import to_artifact
-from quasilpv.reproduction import rules, stabilised_arms, tracking_claims
+from quasilpv.reproduction import rules, stabilised_arms, tracking_claims, tracking_comparison
 from quasilpv.reproduction.closed_loops import (
     EXACT,
     ClosedLoop,
@@ -31,7 +31,8 @@ from quasilpv.reproduction.closed_loops import (
     without_disturbance_states,
 )
 from quasilpv.reproduction.constraints import closure_along, rolling_along
-from quasilpv.reproduction.tracking_claims import Printed
+from quasilpv.reproduction.tracking_claims import RATE_HZ, Printed
+from quasilpv.reproduction.tracking_comparison import Comparison, Sampled
 from quasilpv.synthesis import Specification, synthesise
 from quasilpv.systems.registry import robot
 from reference.readable import assert_readable
@@ -102,6 +103,36 @@ def test_a_speed_estimate_is_better_only_if_it_is_on_every_joint() -> None:
     assert tracking_claims.better_estimates(good, bad).holds
     assert not tracking_claims.better_estimates(bad, good).holds
     assert not tracking_claims.better_estimates(good, good).holds
+
+
+def test_when_controllers_are_compared_expect_each_on_the_same_path_and_plant_at_its_own_rate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(tracking_comparison, "outcome", lambda loop: replace(stand_in(metrics()), loop=loop))
+    column = Printed(1e-3, 2e-3, 3e-3, 4e-3, 1e4)
+    compared = Comparison(
+        name="arm, square",
+        title="arm, square, 4 kHz",
+        scenario="serial-square",
+        law="law",
+        controllers={"PID": Sampled("pid"), "law": Sampled("dob-torque")},
+        printed={"PID": column, "law": column},
+        assumptions=("payload",),
+        beside={"slower": Sampled("dob-acceleration", 1000.0)},
+        plant="chapter-III",
+    )
+    assert compared.others == ("PID",)
+    assert {label: entry.loop for label, entry in (compared.loops | compared.loops_beside).items()} == {
+        "PID": ClosedLoop("serial-square", "pid", RATE_HZ, plant="chapter-III"),
+        "law": ClosedLoop("serial-square", "dob-torque", RATE_HZ, plant="chapter-III"),
+        "slower": ClosedLoop("serial-square", "dob-acceleration", 1000.0, plant="chapter-III"),
+    }
+    without = compared.with_and_without["without"].loop
+    assert without == replace(compared.loops["law"].loop, observer="without disturbance")
+    item = compared.tracking_item("fig-0.0")
+    assert item.title == "arm, square: tracking with law, PID and computed torque"
+    assert item.assumptions == ("payload",)
+    assert item.printed == {"claim": "law tracks best", **column.as_dict()}
 
 
 def test_the_plant_of_chapter_three_has_the_nominal_inertia_more_gravity_on_joint_one_and_friction() -> None:

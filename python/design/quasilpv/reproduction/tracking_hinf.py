@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from functools import partial
 
-from quasilpv.figures.side_by_side import disturbance_estimates, input_columns, tracking_columns
 from quasilpv.reproduction import rules, tracking_claims
-from quasilpv.reproduction.closed_loops import ClosedLoop, Outcome, described, outcome, results
-from quasilpv.reproduction.item import Check, Effort, Finding, Item
+from quasilpv.reproduction.closed_loops import Outcome, described
+from quasilpv.reproduction.item import Check, Finding, Item
 from quasilpv.reproduction.tracking_claims import CTC, CTC_ALONE, PID, RATE_HZ, Printed
+from quasilpv.reproduction.tracking_comparison import Comparison, Sampled
 
 LAW = "Theorem III.10"
-CONTROLLERS = {PID: "pid", CTC: "ctc-dob", LAW: "hinf-tracking"}
 
 PRINTED = {
     "square": {
@@ -37,61 +36,37 @@ ASSUMPTIONS = (
 )
 
 
-def _loops(path: str) -> dict[str, Outcome]:
-    return {label: _run(path, controller) for label, controller in CONTROLLERS.items()}
-
-
-def _run(path: str, controller: str) -> Outcome:
-    return outcome(ClosedLoop(f"serial-{path}", controller, RATE_HZ, plant="chapter-III"))
-
-
-def law_outcome(path: str) -> Outcome:
-    """Theorem III.10 on ``square`` or ``circle``, for comparison."""
-    return _run(path, CONTROLLERS[LAW])
-
-
-def _title(path: str) -> str:
-    return f"3-DoF arm of chapter III, {path}, {RATE_HZ / 1e3:g} kHz, noisy speeds"
-
-
-def _instead(loops: dict[str, Outcome], path: str) -> str:
-    return (
-        "Theorem III.10 feeds nothing forward and its gains are bounded by sampling and noise; computed torque with the"
-        " sign of its observer corrected is the better law. RMS X / Y (mm): "
-        + tracking_claims.rms_listed({**loops, CTC_ALONE: _run(path, "ctc")})
+def _compared(path: str) -> Comparison:
+    return Comparison(
+        name=f"3-DoF arm, {path}",
+        title=f"3-DoF arm of chapter III, {path}, {RATE_HZ / 1e3:g} kHz, noisy speeds",
+        scenario=f"serial-{path}",
+        plant="chapter-III",
+        law=LAW,
+        controllers={PID: Sampled("pid"), CTC: Sampled("ctc-dob"), LAW: Sampled("hinf-tracking")},
+        beside={CTC_ALONE: Sampled("ctc")},
+        printed=PRINTED[path],
+        assumptions=ASSUMPTIONS,
+        reason="Theorem III.10 feeds nothing forward and its gains are bounded by sampling and noise; computed torque"
+        " with the sign of its observer corrected is the better law. ",
     )
 
 
-def _tracking(path: str, _: Effort) -> Finding:
-    loops = _loops(path)
-    checks = [
-        *tracking_claims.better(loops, LAW, (PID, CTC)),
-        tracking_claims.as_accurate(loops, LAW, PRINTED[path][LAW]),
-    ]
-    estimate = disturbance_estimates({CTC: loops[CTC].result}, 2, f"{_title(path)}: disturbance and its estimate")
-    return Finding(
-        checks,
-        described({**loops, CTC_ALONE: _run(path, "ctc")}),
-        {"": tracking_columns(results(loops), _title(path)), "disturbance": estimate},
-        instead=_instead(loops, path),
-    )
+SQUARE, CIRCLE = _compared("square"), _compared("circle")
 
 
-def _inputs(path: str, _: Effort) -> Finding:
-    loops, printed = _loops(path), PRINTED[path]
+def _inputs(compared: Comparison) -> Finding:
+    loops = compared.loops
     checks = [
         *_noisiest(loops),
-        tracking_claims.torque_ratio(loops, printed, LAW, PID),
-        tracking_claims.torque_ratio(loops, printed, LAW, CTC),
+        *(tracking_claims.torque_ratio(loops, compared.printed, LAW, other) for other in compared.others),
     ]
-    if path == "circle":
-        checks += tracking_claims.less_torque_on(loops, _loops("square"))
+    if compared is CIRCLE:
+        checks += tracking_claims.less_torque_on(loops, SQUARE.loops)
     torque = loops[LAW].metrics.rms_torque_nm
-    return Finding(
+    return compared.inputs_finding(
         checks,
-        described(loops),
-        {"": input_columns(results(loops), _title(path))},
-        instead=f"All three controllers move the same arm along the same path against the same disturbance, which takes"
+        "All three controllers move the same arm along the same path against the same disturbance, which takes"
         f" about {torque:.0f} N m rms; only a torque dominated by noise could be twice as large",
     )
 
@@ -109,44 +84,27 @@ def _noisiest(loops: dict[str, Outcome]) -> list[Check]:
     ]
 
 
-def _table(path: str, _: Effort) -> Finding:
-    loops, printed = _loops(path), PRINTED[path]
-    checks = tracking_claims.columns(loops, printed)
-    if path == "circle":
-        checks += tracking_claims.moves_to_y(loops, _loops("square"), (PID, CTC))
-    return Finding(checks, described({**loops, CTC_ALONE: _run(path, "ctc")}), instead=_instead(loops, path))
+def _table(compared: Comparison) -> Finding:
+    loops = compared.loops
+    checks = tracking_claims.columns(loops, compared.printed)
+    if compared is CIRCLE:
+        checks += tracking_claims.moves_to_y(loops, SQUARE.loops, compared.others)
+    return Finding(checks, described({**loops, **compared.loops_beside}), instead=compared.numbers)
 
 
-ITEMS = tuple(
-    item
-    for path, tracking, inputs, table in (
-        ("square", "fig-III.5", "fig-III.6", "table-III.1"),
-        ("circle", "fig-III.7", "fig-III.8", "table-III.2"),
+def _items(compared: Comparison, tracking: str, inputs: str, table: str) -> tuple[Item, ...]:
+    printed = tracking_claims.printed_document(compared.printed)
+    noise = {"claim": "noise shows in the torque of Theorem III.10", **printed}
+    ratios = (*ASSUMPTIONS, tracking_claims.TORQUE_RATIOS)
+    same = "of the same controllers"
+    return (
+        compared.tracking_item(tracking, observers=(CTC,)),
+        compared.item(inputs, f"torques and speed errors {same}", noise, ratios, partial(_inputs, compared)),
+        compared.item(table, f"errors and torques {same}", printed, ratios, partial(_table, compared)),
     )
-    for item in (
-        Item(
-            id=tracking,
-            title=f"3-DoF arm, {path}: tracking with Theorem III.10, PID and computed torque",
-            printed={"claim": "Theorem III.10 tracks best", **PRINTED[path][LAW].as_dict()},
-            assumptions=ASSUMPTIONS,
-            compute=partial(_tracking, path),
-        ),
-        Item(
-            id=inputs,
-            title=f"3-DoF arm, {path}: torques and speed errors of the same controllers",
-            printed={
-                "claim": "noise shows in the torque of Theorem III.10",
-                **tracking_claims.printed_document(PRINTED[path]),
-            },
-            assumptions=(*ASSUMPTIONS, tracking_claims.TORQUE_RATIOS),
-            compute=partial(_inputs, path),
-        ),
-        Item(
-            id=table,
-            title=f"3-DoF arm, {path}: errors and torques of the same controllers",
-            printed=tracking_claims.printed_document(PRINTED[path]),
-            assumptions=(*ASSUMPTIONS, tracking_claims.TORQUE_RATIOS),
-            compute=partial(_table, path),
-        ),
-    )
+
+
+ITEMS = (
+    *_items(SQUARE, "fig-III.5", "fig-III.6", "table-III.1"),
+    *_items(CIRCLE, "fig-III.7", "fig-III.8", "table-III.2"),
 )

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from quasilpv.figures.constraint import constraint_figure
-from quasilpv.figures.side_by_side import input_columns, speed_errors, tracking_columns
+from quasilpv.figures.side_by_side import tracking_columns
 from quasilpv.reproduction import rules, tracking_claims
-from quasilpv.reproduction.closed_loops import ClosedLoop, Observer, Outcome, described, outcome, results
+from quasilpv.reproduction.closed_loops import Outcome, described
 from quasilpv.reproduction.constraints import closure_along
-from quasilpv.reproduction.item import Effort, Finding, Item
+from quasilpv.reproduction.item import Finding
 from quasilpv.reproduction.tracking_claims import PID, RATE_HZ, Printed
+from quasilpv.reproduction.tracking_comparison import Comparison, Sampled
 from quasilpv.scenarios import VELOCITY_NOISE_RAD_S
 
-DEFAULT_RATE_HZ = 2000.0
 CTC, LAW = "CTC (IV.78)", "Theorem IV.11"
-CONTROLLERS = {PID: "pid", CTC: "ctc", LAW: "dob-torque-premultiplied"}
 PLAIN, DEFAULT = "Theorem IV.11 without beta", "default law at 2 kHz"
 
 PRINTED = {
@@ -22,7 +23,6 @@ PRINTED = {
     LAW: Printed(1.25e-4, 1.45e-4, 3.42e-4, 3.18e-4, 10.84),
 }
 
-WITH_AND_WITHOUT: tuple[Observer, Observer] = ("whole", "without disturbance")
 FIVEFOLD = 5.0
 CLOSED_M = 1e-9
 PASSIVE_LENGTHS_M = (0.165, 0.2)
@@ -39,68 +39,41 @@ GAINS = "k_d and g_d are read without the factor 1e4, with which they diverge"
 LAW_ASSUMPTIONS = (tracking_claims.DEFAULTS, PAYLOAD, DESIGN, FILTER, tracking_claims.SAMPLED)
 ASSUMPTIONS = (*LAW_ASSUMPTIONS, READING, GAINS)
 
-
-def _loops(scenario: str = "fivebar-spiral") -> dict[str, Outcome]:
-    return {label: _run(scenario, controller) for label, controller in CONTROLLERS.items()}
-
-
-def _run(scenario: str, controller: str, observer: Observer = "whole", rate_hz: float = RATE_HZ) -> Outcome:
-    return outcome(ClosedLoop(scenario, controller, rate_hz, observer=observer))
-
-
-def _law(scenario: str, observer: Observer = "whole") -> Outcome:
-    return _run(scenario, CONTROLLERS[LAW], observer)
-
-
-def _default(scenario: str, observer: Observer = "whole") -> Outcome:
-    return _run(scenario, "dob-acceleration", observer, DEFAULT_RATE_HZ)
-
-
-def _others(scenario: str) -> dict[str, Outcome]:
-    """What the source does not show and the comparison needs."""
-    return {PLAIN: _run(scenario, "dob-torque"), DEFAULT: _default(scenario)}
+SPIRAL = Comparison(
+    name="five-bar robot, spiral",
+    title=f"five-bar robot with full payload, spiral, {RATE_HZ / 1e3:g} kHz",
+    scenario="fivebar-spiral",
+    law=LAW,
+    controllers={PID: Sampled("pid"), CTC: Sampled("ctc"), LAW: Sampled("dob-torque-premultiplied")},
+    beside={PLAIN: Sampled("dob-torque"), DEFAULT: Sampled("dob-acceleration", 2000.0)},
+    printed=PRINTED,
+    assumptions=ASSUMPTIONS,
+)
+STRONG = replace(
+    SPIRAL,
+    name=f"{SPIRAL.name} under 100 sin 50t N m",
+    title=f"{SPIRAL.title}, 100 sin 50t N m, {LAW}",
+    scenario="fivebar-spiral-strong",
+)
+FAST = replace(SPIRAL, scenario="fivebar-spiral-fast")
 
 
-TITLE = f"five-bar robot with full payload, spiral, {RATE_HZ / 1e3:g} kHz"
+def _inputs() -> Finding:
+    loops = SPIRAL.loops
+    return SPIRAL.inputs_finding([tracking_claims.torque_ratio(loops, PRINTED, LAW, other) for other in SPIRAL.others])
 
 
-def _tracking(_: Effort) -> Finding:
-    loops = _loops()
-    checks = [
-        *tracking_claims.better(loops, LAW, (PID, CTC)),
-        tracking_claims.as_accurate(loops, LAW, PRINTED[LAW]),
-    ]
-    others = _others("fivebar-spiral")
-    return Finding(
-        checks,
-        described({**loops, **others}),
-        {"": tracking_columns(results(loops), TITLE)},
-        instead="RMS X / Y (mm): " + tracking_claims.rms_listed({**loops, **others}),
+def _estimates() -> Finding:
+    better_than_measured = rules.at_most(
+        "estimates are better than the noisy measurement, rms error",
+        {"largest of the joints (rad/s)": VELOCITY_NOISE_RAD_S},
+        {"largest of the joints (rad/s)": max(SPIRAL.run(LAW).speed_errors)},
     )
+    return SPIRAL.estimates_finding([better_than_measured])
 
 
-def _inputs(_: Effort) -> Finding:
-    loops = _loops()
-    checks = [tracking_claims.torque_ratio(loops, PRINTED, LAW, other) for other in (PID, CTC)]
-    return Finding(checks, described(loops), {"": input_columns(results(loops), TITLE)})
-
-
-def _estimates(_: Effort) -> Finding:
-    observing, without = (_law("fivebar-spiral", observer) for observer in WITH_AND_WITHOUT)
-    checks = [
-        tracking_claims.better_estimates(observing, without),
-        rules.at_most(
-            "estimates are better than the noisy measurement, rms error",
-            {"largest of the joints (rad/s)": VELOCITY_NOISE_RAD_S},
-            {"largest of the joints (rad/s)": max(observing.speed_errors)},
-        ),
-    ]
-    figure = speed_errors(without.result, observing.result, f"{TITLE}, Theorem IV.11: error of estimated speeds")
-    return Finding(checks, described({"with": observing, "without": without}), {"": figure})
-
-
-def _closure(_: Effort) -> Finding:
-    run = _law("fivebar-spiral")
+def _closure() -> Finding:
+    run = SPIRAL.run(LAW)
     along = {f"b = {length:g} m": closure_along(run, length) for length in PASSIVE_LENGTHS_M}
     largest = {name: float(closure.error.max()) for name, closure in along.items()}
     checks = [
@@ -115,21 +88,20 @@ def _closure(_: Effort) -> Finding:
     return Finding(
         checks,
         {"largest |h| (m)": largest, **described({LAW: run})},
-        {"": constraint_figure(curves, "|h| (m)", f"{TITLE}, Theorem IV.11: constraint")},
+        {"": constraint_figure(curves, "|h| (m)", f"{SPIRAL.title}, {LAW}: constraint")},
         instead="With equal links closure means q = (theta_2, theta_1), a linear invariant that integration keeps to"
         " the last digit; passive links of another length show what the stabilisation holds",
     )
 
 
-def _strong(_: Effort) -> Finding:
-    scenario = "fivebar-spiral-strong"
-    observing, without = (_law(scenario, observer) for observer in WITH_AND_WITHOUT)
+def _strong() -> Finding:
+    observing, without = STRONG.with_and_without.values()
     loops = {
         "with observer": observing,
         "without observer": without,
-        DEFAULT: _default(scenario),
-        f"{DEFAULT}, not compensating": _default(scenario, "without compensation"),
-        f"{DEFAULT}, without observer": _default(scenario, "without disturbance"),
+        DEFAULT: STRONG.run(DEFAULT),
+        f"{DEFAULT}, not compensating": STRONG.run(DEFAULT, "without compensation"),
+        f"{DEFAULT}, without observer": STRONG.run(DEFAULT, "without disturbance"),
     }
     checks = [
         rules.smaller(
@@ -147,11 +119,10 @@ def _strong(_: Effort) -> Finding:
         ),
     ]
     shown = {label: loops[label].result for label in list(loops)[:2]}
-    title = f"{TITLE}, 100 sin 50t N m, Theorem IV.11"
     return Finding(
         checks,
         described(loops),
-        {"": tracking_columns(shown, title)},
+        {"": tracking_columns(shown, STRONG.title)},
         instead="RMS X / Y (mm): " + tracking_claims.rms_listed(loops),
     )
 
@@ -161,10 +132,9 @@ def _rms_mm(entry: Outcome, factor: float = 1.0) -> dict[str, float]:
     return {"X (mm)": 1e3 * factor * metrics.rms_x_m, "Y (mm)": 1e3 * factor * metrics.rms_y_m}
 
 
-def _table(_: Effort) -> Finding:
-    loops, other = _loops(), _loops("fivebar-spiral-fast")
-    others = _others("fivebar-spiral")
-    computed = described({**loops, **others}) | {
+def _table() -> Finding:
+    loops, other = SPIRAL.loops, FAST.loops
+    computed = described({**loops, **SPIRAL.loops_beside}) | {
         f"{label}, 15 sin 50t on both": entry.described() for label, entry in other.items()
     }
     return Finding(
@@ -172,52 +142,45 @@ def _table(_: Effort) -> Finding:
         computed,
         instead="Disturbed as printed, PID and CTC err alike along both axes, and with 15 sin 50t on both joints along"
         " X; the printed errors, mostly along Y, belong to a spiral or a disturbance that is not stated."
-        f" RMS X / Y (mm): {tracking_claims.rms_listed({**loops, **others})}; with"
-        f" 15 sin 50t on both joints: {tracking_claims.rms_listed(other)}",
+        f" {SPIRAL.numbers}; with 15 sin 50t on both joints: {tracking_claims.rms_listed(other)}",
     )
 
 
 ITEMS = (
-    Item(
-        id="fig-IV.10",
-        title="five-bar robot, spiral: tracking with Theorem IV.11, PID and computed torque",
-        printed={"claim": "Theorem IV.11 tracks best", **PRINTED[LAW].as_dict()},
-        assumptions=ASSUMPTIONS,
-        compute=_tracking,
+    SPIRAL.tracking_item("fig-IV.10"),
+    SPIRAL.item(
+        "fig-IV.11",
+        "torques of the same controllers",
+        {"claim": "torques alike", **{f"RMS_u {law}": column.rms_torque for law, column in PRINTED.items()}},
+        (*ASSUMPTIONS, tracking_claims.TORQUE_RATIOS),
+        _inputs,
     ),
-    Item(
-        id="fig-IV.11",
-        title="five-bar robot, spiral: torques of the same controllers",
-        printed={"claim": "torques alike", **{f"RMS_u {law}": column.rms_torque for law, column in PRINTED.items()}},
-        assumptions=(*ASSUMPTIONS, tracking_claims.TORQUE_RATIOS),
-        compute=_inputs,
+    SPIRAL.item(
+        "fig-IV.12",
+        "estimated speeds with and without disturbance observer",
+        {"claim": "better with the disturbance observer, and better than the noisy measurement"},
+        (*LAW_ASSUMPTIONS, READING, tracking_claims.WITHOUT),
+        _estimates,
     ),
-    Item(
-        id="fig-IV.12",
-        title="five-bar robot, spiral: estimated speeds with and without disturbance observer",
-        printed={"claim": "better with the disturbance observer, and better than the noisy measurement"},
-        assumptions=(*LAW_ASSUMPTIONS, READING, tracking_claims.WITHOUT),
-        compute=_estimates,
+    SPIRAL.item(
+        "fig-IV.13",
+        "constraint over time",
+        {"claim": "the algebraic constraints are fully respected"},
+        (*LAW_ASSUMPTIONS, READING, "'fully' is read as at most 1e-9 m"),
+        _closure,
     ),
-    Item(
-        id="fig-IV.13",
-        title="five-bar robot, spiral: constraint over time",
-        printed={"claim": "the algebraic constraints are fully respected"},
-        assumptions=(*LAW_ASSUMPTIONS, READING, "'fully' is read as at most 1e-9 m"),
-        compute=_closure,
+    STRONG.item(
+        "fig-IV.14",
+        "with and without disturbance observer",
+        {"claim": "errors significantly lower along X and Y with the disturbance observer"},
+        (*LAW_ASSUMPTIONS, tracking_claims.WITHOUT),
+        _strong,
     ),
-    Item(
-        id="fig-IV.14",
-        title="five-bar robot, spiral under 100 sin 50t N m, with and without disturbance observer",
-        printed={"claim": "errors significantly lower along X and Y with the disturbance observer"},
-        assumptions=(*LAW_ASSUMPTIONS, tracking_claims.WITHOUT),
-        compute=_strong,
-    ),
-    Item(
-        id="table-IV.5",
-        title="five-bar robot, spiral: errors and torques of all controllers",
-        printed=tracking_claims.printed_document(PRINTED),
-        assumptions=(*ASSUMPTIONS, tracking_claims.TORQUE_RATIOS),
-        compute=_table,
+    SPIRAL.item(
+        "table-IV.5",
+        "errors and torques of all controllers",
+        tracking_claims.printed_document(PRINTED),
+        (*ASSUMPTIONS, tracking_claims.TORQUE_RATIOS),
+        _table,
     ),
 )
