@@ -257,26 +257,21 @@ def _table_iv6(effort: Effort) -> Finding:
     )
 
 
-ITEMS = (
-    Item(
-        id="fig-IV.15",
-        title="tracking with two, one and no measured premises",
-        printed={"claim": "the fewer premises are measured, the worse the tracking and the disturbance estimate"},
-        assumptions=CONDITIONS,
-        compute=_fig_iv15,
-    ),
-    Item(
-        id="fig-IV.16",
-        title="speed estimates with two, one and no measured premises",
-        printed={"claim": "the fewer premises are measured, the worse the estimate of the speeds"},
-        assumptions=CONDITIONS,
-        compute=_fig_iv16,
-    ),
-    Item(
-        id="table-IV.6",
-        title="the square with two, one and no measured premises",
-        printed=PRINTED,
-        assumptions=CONDITIONS,
-        compute=_table_iv6,
-    ),
+ITEMS = tuple(
+    Item(item_id, title, printed, CONDITIONS, compute)
+    for item_id, title, printed, compute in (
+        (
+            "fig-IV.15",
+            "tracking with two, one and no measured premises",
+            {"claim": "the fewer premises are measured, the worse the tracking and the disturbance estimate"},
+            _fig_iv15,
+        ),
+        (
+            "fig-IV.16",
+            "speed estimates with two, one and no measured premises",
+            {"claim": "the fewer premises are measured, the worse the estimate of the speeds"},
+            _fig_iv16,
+        ),
+        ("table-IV.6", "the square with two, one and no measured premises", PRINTED, _table_iv6),
+    )
 )
