@@ -7,9 +7,9 @@
 #include <memory>
 
 #include "artifact_fixture.hpp"
-#include "loop_fixture.hpp"
 #include "quasilpv/controller.hpp"
 #include "quasilpv/trajectory.hpp"
+#include "quiet_robot.hpp"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define QUASILPV_COUNTS_ALLOCATIONS 0  // sanitizers bring their own malloc
@@ -69,6 +69,10 @@ namespace {
 using ::quasilpv::testing::artifact_table;
 using ::quasilpv::testing::json_twin;
 using ::quasilpv::testing::kLawKinds;
+using ::quasilpv::testing::kPaces;
+using ::quasilpv::testing::make_loop;
+using ::quasilpv::testing::QuietRobot;
+using ::quasilpv::testing::run_control_thread;
 
 // Allocations made by `action`.
 template <class Action>
@@ -161,26 +165,17 @@ TEST_F(Allocation, does_not_happen_when_a_trajectory_is_evaluated) {
   EXPECT_GT(sum, 0.0);
 }
 
-// Good samples, gaps, bad angles, a fault, its reset and telemetry that nobody takes away.
-TEST_F(Allocation, does_not_happen_in_the_control_loop_whatever_the_readings) {
-  LoopSettings settings;
-  settings.bumpless_start = true;
-  ControlLoop loop(::quasilpv::testing::artifact(), ::quasilpv::testing::trajectory(), settings);
-  auto ring = std::make_unique<SampleRing>();
-  loop.publish_to(ring.get());
-  std::int64_t resets = 0;
-  EXPECT_EQ(allocations_of([&] {
-              for (std::int64_t seq = 0; seq < 10000; seq += seq % 7 == 0 ? 3 : 1) {
-                RobotReading reading = ::quasilpv::testing::reading(seq);
-                reading.angle_rad[1] = seq % 1000 < 30 ? std::numeric_limits<double>::quiet_NaN() : 0.1;
-                loop.handle(reading, ::quasilpv::testing::at(seq));
-                resets += seq % 1000 == 500 && loop.reset_fault() ? 1 : 0;
-              }
-              loop.handle_silence(::quasilpv::testing::at(10000));
-            }),
-            0);
-  EXPECT_GT(resets, 0);
-  EXPECT_EQ(loop.state(), ControllerState::kFault);
+TEST_F(Allocation, does_not_happen_in_the_control_thread_of_any_law_whatever_the_robot_does) {
+  for (const char* kind : kLawKinds) {
+    for (const Pace pace : kPaces) {
+      ControlLoop loop = make_loop(kind);
+      auto ring = std::make_unique<SampleRing>();  // nobody empties it
+      loop.publish_to(ring.get());
+      QuietRobot robot;
+      EXPECT_EQ(allocations_of([&] { run_control_thread(loop, robot, pace); }), 0) << kind;
+      EXPECT_GT(ring->drops(), 0);
+    }
+  }
 }
 
 }  // namespace

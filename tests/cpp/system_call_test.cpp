@@ -1,4 +1,4 @@
-// No system call but the clock in the control step: a child process gives up the right to make any, and goes on
+// No system call but the clock in the control thread: a child process gives up the right to make any, and goes on
 // controlling.
 #include <gtest/gtest.h>
 #include <linux/filter.h>
@@ -10,19 +10,18 @@
 
 #include <cstddef>
 #include <iterator>
-#include <limits>
 #include <memory>
 
-#include "loop_fixture.hpp"
+#include "quiet_robot.hpp"
 
 namespace quasilpv {
 namespace {
 
-using ::quasilpv::testing::artifact;
-using ::quasilpv::testing::at;
 using ::quasilpv::testing::kLawKinds;
-using ::quasilpv::testing::reading;
-using ::quasilpv::testing::trajectory;
+using ::quasilpv::testing::kPaces;
+using ::quasilpv::testing::make_loop;
+using ::quasilpv::testing::QuietRobot;
+using ::quasilpv::testing::run_control_thread;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kSanitized = true;  // sanitizers make system calls of their own
@@ -73,22 +72,15 @@ TEST_F(SystemCall, kills_the_child_that_makes_one) {
   EXPECT_FALSE(ends_without_a_system_call([] { getppid(); }));
 }
 
-TEST_F(SystemCall, is_not_made_by_the_control_loop_of_any_law_whatever_the_readings) {
+TEST_F(SystemCall, is_not_made_by_the_control_thread_of_any_law_whatever_the_robot_does) {
   for (const char* kind : kLawKinds) {
-    LoopSettings settings;
-    settings.bumpless_start = true;
-    ControlLoop loop(artifact(kind), trajectory(), settings);
-    auto ring = std::make_unique<SampleRing>();
-    loop.publish_to(ring.get());
-    EXPECT_TRUE(ends_without_a_system_call([&] {
-      for (std::int64_t seq = 0; seq < 5000; seq += seq % 7 == 0 ? 3 : 1) {
-        RobotReading next = reading(seq);
-        next.angle_rad[1] = seq % 1000 < 30 ? std::numeric_limits<double>::quiet_NaN() : 0.1;
-        loop.handle(next, at(seq));
-        loop.reset_fault();
-      }
-      loop.handle_silence(at(5000));
-    })) << kind;
+    for (const Pace pace : kPaces) {
+      ControlLoop loop = make_loop(kind);
+      auto ring = std::make_unique<SampleRing>();
+      loop.publish_to(ring.get());
+      QuietRobot robot;
+      EXPECT_TRUE(ends_without_a_system_call([&] { run_control_thread(loop, robot, pace); })) << kind;
+    }
   }
 }
 
