@@ -8,8 +8,8 @@ import numpy as np
 
 from quasilpv.errors import InputError
 from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.run import FloatArray, Run
-from quasilpv.experiments.track import summarise_as
+from quasilpv.experiments.run import Run
+from quasilpv.experiments.track import run_from_columns, summarise_as
 from quasilpv.scenarios import FiveBarPlant, LinkParameters, Plant, SerialArmPlant
 from quasilpv.systems.arm_parameters import Link
 from quasilpv.systems.arms import PlanarSerialArm
@@ -18,6 +18,7 @@ from quasilpv.systems.fivebar_linkage import FiveBarLinkage
 from quasilpv.systems.mechanism import PlanarMechanism
 from quasilpv.systems.rolling_disc import RollingDisc
 from quasilpv.telemetry import RunLog
+from quasilpv.telemetry.recording import columns_of
 
 
 def logged_result(log: RunLog) -> TrackResult:
@@ -50,26 +51,9 @@ def logged_run(log: RunLog) -> Run:
     if not seq.size:
         raise InputError(log.source, "QLPV_TRUTH", "no sample", "the true motion of the plant beside QLPV_TELEMETRY")
     telemetry, truth, n, T = telemetry[told], truth[true], log.artifact.joints, log.artifact.sample_period_s
-
-    def told_by(name: str) -> FloatArray:
-        return np.array(telemetry[name][:, :n])
-
-    return Run(
-        sample_period_s=T,
-        time_s=seq * T,
-        reference_angle_rad=told_by("reference_angle_rad"),
-        reference_speed_rad_s=told_by("reference_speed_rad_s"),
-        true_angle_rad=np.array(truth["angle_rad"][:, :n]),
-        true_speed_rad_s=np.array(truth["speed_rad_s"][:, :n]),
-        true_acceleration_rad_s2=np.array(truth["acceleration_rad_s2"][:, :n]),
-        measured_angle_rad=told_by("measured_angle_rad"),
-        estimated_angle_rad=told_by("estimated_angle_rad"),
-        estimated_speed_rad_s=told_by("estimated_speed_rad_s"),
-        estimated_disturbance=told_by("estimated_disturbance"),
-        filtered_disturbance=told_by("filtered_disturbance"),
-        torque_nm=told_by("applied_torque_nm"),
-        flags=telemetry["flags"].astype(np.int64),
-    )
+    columns = {"time_s": seq * T, "flags": telemetry["flags"]}
+    columns |= columns_of("QLPV_TELEMETRY", telemetry, n) | columns_of("QLPV_TRUTH", truth, n)
+    return run_from_columns(columns, n, T)
 
 
 def mechanism_of(plant: Plant) -> PlanarMechanism:

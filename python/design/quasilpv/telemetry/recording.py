@@ -120,6 +120,17 @@ def messages(
     return records
 
 
+def columns_of(channel: str, records: Records, joints: int) -> dict[str, FloatArray]:
+    """The columns that messages of a channel hold, (N, n): the inverse of `messages`.
+
+    Args:
+        channel: of those that come once per sample.
+        records: (N,) its messages.
+        joints: n.
+    """
+    return {column: np.array(records[member][:, :joints]) for member, column in _MEMBERS[channel].items()}
+
+
 def _in_order(documents: RunDocuments, streams: Mapping[str, Records]) -> Iterator[Event]:
     yield from documents.events(0)
     times = streams["QLPV_TELEMETRY"]["utime"].tolist()
