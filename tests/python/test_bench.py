@@ -45,7 +45,7 @@ def test_every_row_is_a_positive_cost_with_a_name_of_its_own(layer: str) -> None
     assert rows
     assert len({row["name"] for row in rows}) == len(rows)
     for row in rows:
-        assert set(row) == {"name", "value", "unit", "against", "ratio"}
+        assert set(row) == {"name", "value", "unit", "against", "ratio", "spread"}
         assert row["unit"] in {"ns", "us", "ms", "s", "MiB", "1"}
         assert math.isfinite(row["value"])
         assert row["value"] > 0

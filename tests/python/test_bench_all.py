@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from bench_all import LAYERS, main, page
 from bench_certificate import COMPETITORS
 from bench_compare import LEAST_NOISE, changes, read_results
 from bench_footprint import high_water_mib, peak_mib
 from bench_programs import ProgramError
+from bench_report import REPETITIONS, Report, row, spread_of
 from flint import fmpq_mat
 
 from quasilpv.certificate.exact_matrices import is_positive_definite
@@ -22,13 +25,21 @@ REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
 
 
 def results(ours: float, theirs: float, alone: float = 1.0) -> dict[str, Any]:
-    """A layer with a competitor and a row without."""
-    beside = {"name": "a", "value": ours, "unit": "ms", "against": "theirs", "ratio": theirs / ours}
-    return {"layers": {"lmi": {"rows": [beside, {"name": "b", "value": alone, "against": None, "ratio": None}]}}}
+    """A layer with a competitor of another project and a row without."""
+    rows = [row("a", ours, "ms", ("theirs", theirs)), row("b", alone, "ms")]
+    return kept({"lmi": Report(rows, foreign=True)})
+
+
+def kept(reports: Mapping[str, Report]) -> dict[str, Any]:
+    return {"layers": {layer: report.to_document() for layer, report in reports.items()}}
+
+
+def marks(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    return [change.mark for change in changes(old, new)]
 
 
 @pytest.mark.parametrize(
-    ("new", "marks"),
+    ("new", "expected"),
     [
         (results(2.0, 10.0), ["dearer", "~"]),  # the competitor stood still: ours changed
         (results(2.0, 20.0, 0.4), ["~", "cheaper"]),  # the machine was twice as slow
@@ -37,9 +48,64 @@ def results(ours: float, theirs: float, alone: float = 1.0) -> dict[str, Any]:
     ],
 )
 def test_a_change_counts_only_beyond_what_the_competitors_of_its_layer_moved(
-    new: dict[str, Any], marks: list[str]
+    new: dict[str, Any], expected: list[str]
 ) -> None:
-    assert [change.mark for change in changes(results(1.0, 10.0), new)] == marks
+    assert marks(results(1.0, 10.0), new) == expected
+
+
+def plant(seed: int, *, ida: float = 100.0, machine: float = 1.0) -> dict[str, Any]:
+    """A run of a layer that competes with itself, its repetitions scattered by a fifth, on a machine so much slower."""
+    random = np.random.default_rng(seed)
+
+    def repeated(cost: float) -> list[float]:
+        return (cost * machine * np.exp(random.uniform(-0.2, 0.2, REPETITIONS))).tolist()
+
+    rows = [
+        row("IDA beside RK4", repeated(ida), "us", ("RK4", repeated(20.0))),
+        row("RK4 beside IDA", repeated(20.0), "us", ("IDA", repeated(ida))),
+        row("vertices", 6.0, "1"),
+    ]
+    beside = [row("ours", repeated(1.0), "ms", ("sympy", repeated(50.0)))]
+    return kept({"plant": Report(rows), "certificate": Report(beside, foreign=True)})
+
+
+def test_when_the_same_code_runs_twice_expect_no_change_though_its_medians_differ() -> None:
+    pairs = [(plant(seed), plant(seed + 1)) for seed in range(0, 400, 2)]
+    assert any(abs(change.ratio - 1.0) > LEAST_NOISE - 1.0 for old, new in pairs for change in changes(old, new))
+    assert sum(mark != "~" for old, new in pairs for mark in marks(old, new)) <= 0.01 * 4 * len(pairs)
+
+
+def test_when_the_code_of_one_row_changes_expect_it_alone_though_it_is_the_competitor_of_another() -> None:
+    assert marks(plant(0), plant(1, ida=50.0)) == ["cheaper", "~", "~", "~"]
+    assert marks(plant(0), plant(1, ida=200.0)) == ["dearer", "~", "~", "~"]
+
+
+def test_when_the_machine_is_slower_expect_a_layer_without_foreign_competitors_judged_by_those_of_others() -> None:
+    assert marks(plant(0), plant(1, machine=3.0)) == ["~"] * 4
+    without = [{"layers": {"plant": run["layers"]["plant"]}} for run in (plant(0), plant(1, machine=3.0))]
+    assert marks(*without) == ["dearer", "dearer", "~"]
+
+
+def test_when_a_row_was_measured_once_expect_the_widest_spread_of_its_layer() -> None:
+    def run(once: float) -> dict[str, Any]:
+        return kept({"lmi": Report([row("many", [1.0, 1.3], "ms"), row("once", once, "s")])})
+
+    assert marks(run(1.0), run(1.29)) == ["~", "~"]
+    assert marks(run(1.0), run(1.31)) == ["~", "dearer"]
+
+
+def test_when_a_count_changes_expect_it_never_taken_for_noise() -> None:
+    def run(unknowns: float) -> dict[str, Any]:
+        return kept({"model": Report([row("stated", [1.0, 2.0], "s"), row("unknowns", unknowns, "1")])})
+
+    assert marks(run(1000.0), run(1001.0)) == ["~", "dearer"]
+
+
+def test_spread_is_between_medians_of_parts_so_that_one_outlier_is_none() -> None:
+    assert spread_of(3.0) is None
+    assert spread_of([1.0, 1.5]) == 1.5
+    assert spread_of([1.0, 1.0, 50.0] * REPETITIONS) == 1.0
+    assert spread_of([1.0] * 12 + [2.0] * 3) == 2.0
 
 
 def test_when_a_row_is_new_expect_no_change_of_it() -> None:

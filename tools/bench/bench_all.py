@@ -6,7 +6,6 @@ import argparse
 import json
 import sys
 from collections.abc import Mapping
-from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from time import monotonic
@@ -14,10 +13,9 @@ from typing import Any
 
 from bench_compare import changes, read_results
 from bench_pinocchio import rnea_program
-from bench_report import HEADER, KEPT, DisagreementError, Report, circumstances, print_cells
+from bench_report import HEADER, KEPT, Report, circumstances, exit_code_of, factor, print_cells
 
 from quasilpv.artifact.files import write_atomically
-from quasilpv.errors import QuasilpvError
 
 LAYERS = ("model", "lmi", "certificate", "step", "premises", "plant", "transport", "latency", "soak", "footprint")
 
@@ -30,25 +28,26 @@ def main() -> int:
     parser.add_argument("--only", metavar="LAYER", choices=LAYERS, action="append", help="may be repeated")
     parser.add_argument("-o", "--out", metavar="DIR", type=Path, default=KEPT, help="of all.json and all.md")
     options = parser.parse_args()
-    try:
+
+    def measured() -> None:
         rnea_program(may_build=True)  # a quick run of the step alone leaves it out
         old = None if options.compare is None else read_results(options.compare)
         results = measure_all(options.only or LAYERS, quick=options.quick)
-        name = "quick" if options.quick else "all"
-        options.out.mkdir(parents=True, exist_ok=True)
-        kept = {f"{name}.json": json.dumps(results, indent=2, allow_nan=False) + "\n", f"{name}.md": page(results)}
-        write_atomically({options.out / file: text.encode() for file, text in kept.items()})
-    except DisagreementError as error:
-        print(error, file=sys.stderr)
-        return 1
-    except QuasilpvError as error:
-        print(error, file=sys.stderr)
-        return 2
+        keep_all(options.out, results)
+        if old is not None:
+            print_changes(old, results)
+
+    return exit_code_of(measured)
+
+
+def keep_all(folder: Path, results: Mapping[str, Any]) -> None:
+    """Write the results and their page into a folder, and print the page."""
+    name = "quick" if results["quick"] else "all"
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = {f"{name}.json": json.dumps(results, indent=2, allow_nan=False) + "\n", f"{name}.md": page(results)}
+    write_atomically({folder / file: text.encode() for file, text in kept.items()})
     print(page(results))
-    print(f"kept: {options.out / name}.json and {name}.md", file=sys.stderr)
-    if old is not None:
-        print_changes(old, results)
-    return 0
+    print(f"kept: {folder / name}.json and {name}.md", file=sys.stderr)
 
 
 def measure_all(layers: tuple[str, ...], *, quick: bool) -> dict[str, Any]:
@@ -60,8 +59,7 @@ def measure_all(layers: tuple[str, ...], *, quick: bool) -> dict[str, Any]:
         found[layer] = import_module(f"bench_{layer}").measure(quick)
         print(f"{layer}: {monotonic() - start:.0f} s", file=sys.stderr)
     about["versions"] = circumstances([name for report in found.values() for name in report.packages])["versions"]
-    documents = {layer: {"rows": asdict(report)["rows"], "notes": report.notes} for layer, report in found.items()}
-    return {**about, "quick": quick, "layers": documents}
+    return {**about, "quick": quick, "layers": {layer: report.to_document() for layer, report in found.items()}}
 
 
 def page(results: Mapping[str, Any]) -> str:
@@ -76,10 +74,16 @@ def page(results: Mapping[str, Any]) -> str:
         f"{HEADER[0].upper()}{HEADER[1:]}. What is measured and how: [benchmarks](benchmarks.md).",
     ]
     for layer, found in results["layers"].items():
-        lines += ["", f"## {layer}", "", "| | value | unit | ratio | competitor |", "|---|--:|---|--:|---|"]
         lines += [
-            f"| {row['name']} | {row['value']:.4g} | {row['unit']} | "
-            f"{'' if row['ratio'] is None else format(row['ratio'], '.3g')} | {row['against'] or ''} |"
+            "",
+            f"## {layer}",
+            "",
+            "| | value | unit | spread | ratio | competitor |",
+            "|---|--:|---|--:|--:|---|",
+        ]
+        lines += [
+            f"| {row['name']} | {row['value']:.4g} | {row['unit']} | {factor(row.get('spread'))} | "
+            f"{factor(row['ratio'])} | {row['against'] or ''} |"
             for row in found["rows"]
         ]
         lines += ["", *(f"* {note}" for note in found["notes"])]
@@ -89,17 +93,10 @@ def page(results: Mapping[str, Any]) -> str:
 def print_changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
     """Print new / old of every row both have."""
     rows = [
-        (
-            change.name,
-            f"{change.old:.4g}",
-            f"{change.new:.4g}",
-            f"{change.ratio:.3g}",
-            f"{change.noise:.3g}",
-            change.mark,
-        )
-        for change in changes(old, new)
+        (each.name, f"{each.old:.4g}", f"{each.new:.4g}", factor(each.ratio), factor(each.noise), each.mark)
+        for each in changes(old, new)
     ]
-    title = "new / old; noise: by which factor the competitors of the layer moved, whose code is the same; ~ within it"
+    title = "new / old; noise: the factor that the same code can differ by, in these two runs; ~ within it"
     print_cells(title, ("", "old", "new", "new / old", "noise", ""), rows)
 
 

@@ -6,10 +6,11 @@ import re
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from bench_programs import Experiment, ProgramError
+from bench_programs import Experiment, ProgramError, costs, run_in_turns
 from bench_report import Report, main, row
 
 from quasilpv.experiments.hil import find_executable
@@ -21,8 +22,7 @@ STATUS = Path("/proc/self/status")
 
 
 def measure(quick: bool) -> Report:
-    """Run both programs over LCM and watch the high-water marks of their memory. A quick run is the same run."""
-    del quick
+    """Run both programs over LCM and watch the high-water marks of their memory; then those of the competitor."""
     with TemporaryDirectory() as folder:
         experiment = Experiment.write(Path(folder))
         common = ["--artifact", str(experiment.artifact("dob-acceleration")), "--session", "1", "--url", URL]
@@ -30,15 +30,22 @@ def measure(quick: bool) -> Report:
             "qlpv-controller": ["--trajectory", experiment.trajectory],
             "qlpv-simulator": ["--scenario", experiment.scenario],
         }
-        peaks = peak_mib(
-            {name: [find_executable(name), *common, *map(str, options)] for name, options in inputs.items()}
-        )
-    numpy = f"import numpy, pathlib; print(pathlib.Path({str(STATUS)!r}).read_text())"
-    status = subprocess.run([sys.executable, "-c", numpy], capture_output=True, text=True, check=True).stdout
-    against = COMPETITOR, high_water_mib(status) or 0.0
-    rows = [row(f"{name}: peak resident memory", peak, "MiB", against) for name, peak in peaks.items()]
-    rows.append(row(COMPETITOR, against[1], "MiB"))
-    return Report(rows, ["whole lock-step run of serial-square over LCM; VmHWM, shared libraries included"], ("numpy",))
+        programs = {name: [find_executable(name), *common, *map(str, options)] for name, options in inputs.items()}
+        measured = run_in_turns({"loop": partial(peak_mib, programs), COMPETITOR: idle_mib}, quick=quick)
+    against = COMPETITOR, costs(measured[COMPETITOR])
+    rows = [row(f"{name}: peak resident memory", costs(measured["loop"], name), "MiB", against) for name in programs]
+    rows.append(row(*against, "MiB"))
+    return Report(
+        rows, ["whole lock-step run of serial-square over LCM; VmHWM, shared libraries included"], ("numpy",), True
+    )
+
+
+def idle_mib() -> float:
+    """The high-water mark of a Python process that has imported numpy, MiB."""
+    program = f"import numpy, pathlib; print(pathlib.Path({str(STATUS)!r}).read_text())"
+    return high_water_mib(
+        subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    )
 
 
 def peak_mib(commands: dict[str, list[str]]) -> dict[str, float]:

@@ -6,11 +6,12 @@ import json
 import os
 import shutil
 import subprocess
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from bench_programs import Experiment, ProgramError
+from bench_programs import Documents, Experiment, ProgramError, costs, run_in_turns
 from bench_report import Report, Row, main, row
 
 from quasilpv.experiments.hil import find_executable
@@ -25,16 +26,23 @@ QUANTILES = {"p50": "p50", "p99": "p99", "p99.9": "p99_9"}
 
 
 def measure(quick: bool) -> Report:
-    """Ask the doctor twice; under SCHED_FIFO its wake-up is that of the privileged run."""
+    """Ask the doctor in both ways; under SCHED_FIFO its wake-up is that of the privileged run."""
     with TemporaryDirectory() as folder:
         artifact = Experiment.write(Path(folder)).artifact("dob-acceleration")
-        seconds = "0.05" if quick else "20"
-        bare = doctor(WITHOUT_PRIVILEGES, artifact, seconds)
-        privileged = doctor((), artifact, seconds)
-    notes = [f"{seconds} s of each at 1 kHz: every step comes after a millisecond of sleep, with cold caches"]
+        seconds = "0.05" if quick else "4"
+        ways = {"bare": WITHOUT_PRIVILEGES, "privileged": ()}
+        runs = {name: partial(doctor, prefix, artifact, seconds) for name, prefix in ways.items()}
+        measured = run_in_turns(runs, quick=quick)
+    bare, privileged = measured["bare"], measured["privileged"]
+    notes = [
+        f"{len(bare)} times {seconds} s of each at 1 kHz: every step comes after a millisecond of sleep, "
+        "with cold caches"
+    ]
     rows = rows_of("without privilege", bare)
-    if privileged["fifo"]:
-        rows += rows_of("SCHED_FIFO", {**privileged, "wakeup_ns": privileged["wakeup_fifo_ns"]})
+    if all(findings["fifo"] for findings in privileged):
+        rows += rows_of(
+            "SCHED_FIFO", [{**findings, "wakeup_ns": findings["wakeup_fifo_ns"]} for findings in privileged]
+        )
     else:
         notes.append("SCHED_FIFO is not permitted here: nothing was measured with it")
     return Report(rows, notes)
@@ -56,10 +64,10 @@ def doctor(prefix: tuple[str, ...], artifact: Path, seconds: str) -> Any:
     return json.loads(done.stdout)
 
 
-def rows_of(privilege: str, findings: Any) -> list[Row]:
+def rows_of(privilege: str, findings: Documents) -> list[Row]:
     """One row per latency and quantile."""
     return [
-        row(f"{name} {label}, {privilege}", findings[key][quantile] * 1e-3, "us")
+        row(f"{name} {label}, {privilege}", costs(findings, key, quantile, scale=1e-3), "us")
         for name, key in MEASURED.items()
         for label, quantile in QUANTILES.items()
     ]

@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from statistics import median
 from time import process_time_ns
 from typing import Any
 from unittest.mock import patch
@@ -132,20 +131,32 @@ class Way:
     solve: Callable[[Any], float]
 
 
-def median_cpu_ms(ways: Sequence[Way], repetitions: int) -> list[tuple[float, float]]:
-    """Median CPU times (statement, solution) of each way, ms.
+@dataclass(frozen=True)
+class Spent:
+    """CPU times of the repetitions of one way, ms.
 
-    They take turns, so that whatever else the machine does meets them all.
+    Attributes:
+        solving: from the stated problem on.
+        whole: with its statement.
     """
-    times: list[list[tuple[int, int]]] = [[] for _ in ways]
+
+    solving: list[float] = field(default_factory=list)
+    whole: list[float] = field(default_factory=list)
+
+
+def spent_ms(ways: Sequence[Way], repetitions: int) -> list[Spent]:
+    """CPU times of each way. They take turns, so that whatever else the machine does meets them all."""
+    spent = [Spent() for _ in ways]
     for _ in range(repetitions):
-        for way, kept in zip(ways, times, strict=True):
+        for way, kept in zip(ways, spent, strict=True):
             start = process_time_ns()
             stated = way.state()
             middle = process_time_ns()
             way.solve(stated)
-            kept.append((middle - start, process_time_ns() - middle))
-    return [(median(s for s, _ in kept) * 1e-6, median(s for _, s in kept) * 1e-6) for kept in times]
+            end = process_time_ns()
+            kept.solving.append((end - middle) * 1e-6)
+            kept.whole.append((end - start) * 1e-6)
+    return spent
 
 
 def require_agreement(name: str, direct: Way, naive: Way) -> str:
@@ -187,7 +198,8 @@ def measure(quick: bool) -> Report:
     for more_rows, more_notes in (measure_map(quick=quick), measure_large(LARGE[:1] if quick else LARGE)):
         rows += more_rows
         notes += more_notes
-    return Report(rows, notes, packages=("clarabel", "cvxpy", "scs", "cvxopt", "sdpa-python", "numpy", "scipy"))
+    packages = ("clarabel", "cvxpy", "scs", "cvxopt", "sdpa-python", "numpy", "scipy")
+    return Report(rows, notes, packages, foreign=True)
 
 
 def measure_chains(*, quick: bool) -> tuple[list[Row], list[str]]:
@@ -198,9 +210,9 @@ def measure_chains(*, quick: bool) -> tuple[list[Row], list[str]]:
         direct = Way(partial(state_directly, case), solve_directly)
         naive = Way(partial(case.naive, case.bandwidth), solve_naively)
         notes.append(require_agreement(case.name, direct, naive))
-        ours, theirs = median_cpu_ms([direct, naive], repetitions=1 if quick else 30)
-        rows.append(row(f"{case.name}: assembly and solve", ours[1], "ms", (CVXPY, theirs[1])))
-        rows.append(row(f"{case.name}: with its statement", sum(ours), "ms", (CVXPY, sum(theirs))))
+        ours, theirs = spent_ms([direct, naive], repetitions=1 if quick else 30)
+        rows.append(row(f"{case.name}: assembly and solve", ours.solving, "ms", (CVXPY, theirs.solving)))
+        rows.append(row(f"{case.name}: with its statement", ours.whole, "ms", (CVXPY, theirs.whole)))
     return rows, notes
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from bench_programs import Experiment, five_bar_scenario, run_program
+from bench_programs import Documents, Experiment, costs, five_bar_scenario, run_in_turns, run_program
 from bench_report import Report, Row, main, row
 
 COMPETITOR_OF = {
@@ -19,27 +20,35 @@ COMPETITOR_OF = {
 
 def measure(quick: bool) -> Report:
     """Time every integrator over the same run of each plant, beside real time and beside another integrator."""
-    rounds = 1 if quick else 11
+    rounds = 1 if quick else 3
     with TemporaryDirectory() as name:
         folder = Path(name)
         experiment = Experiment.write(folder)
-        arm = run_program("plant_bench", experiment.artifact("ctc"), experiment.trajectory, experiment.scenario, rounds)
-        five_bar = run_program("five_bar_bench", five_bar_scenario(folder), rounds)
-    results = {"arm": arm, "five-bar": five_bar}
+        arm_inputs = experiment.artifact("ctc"), *experiment.inputs
+        runs = {
+            "arm": partial(run_program, "plant_bench", *arm_inputs, rounds),
+            "five-bar": partial(run_program, "five_bar_bench", five_bar_scenario(folder), rounds),
+        }
+        measured = run_in_turns(runs, quick=quick)
+    arm = measured["arm"][0]
     notes = [
         f"CPU time of one sample of {arm['sample_period_s'] * 1e6:g} us, the integrator restarted at each; ratio to "
         f"real time = real-time factor; IDA at a relative tolerance of {arm['relative_tolerance']:g}"
     ]
     return Report(
-        [entry for plant, result in results.items() for entry in rows_of(plant, result)],
-        notes + [note for plant, result in results.items() for note in errors_of(plant, result)],
+        [entry for plant, documents in measured.items() for entry in rows_of(plant, documents)],
+        notes + [note for plant, documents in measured.items() for note in errors_of(plant, documents[0])],
     )
 
 
-def rows_of(plant: str, result: dict[str, Any]) -> list[Row]:
+def rows_of(plant: str, documents: Documents) -> list[Row]:
     """The rows of one plant."""
-    period_us = result["sample_period_s"] * 1e6
-    times_us = {entry["integrator"]: entry["cpu_ns_per_sample"] * 1e-3 for entry in result["integrators"]}
+    period_us = documents[0]["sample_period_s"] * 1e6
+    integrators = [entry["integrator"] for entry in documents[0]["integrators"]]
+    times_us = {
+        integrator: costs(documents, "integrators", place, "cpu_ns_per_sample", scale=1e-3)
+        for place, integrator in enumerate(integrators)
+    }
     rows: list[Row] = []
     for integrator, time_us in times_us.items():
         competitor = COMPETITOR_OF[integrator]
@@ -49,7 +58,7 @@ def rows_of(plant: str, result: dict[str, Any]) -> list[Row]:
     return rows
 
 
-def errors_of(plant: str, result: dict[str, Any]) -> list[str]:
+def errors_of(plant: str, result: Any) -> list[str]:
     """What every integrator of one plant gets wrong, in words."""
     return [
         f"{plant}: {entry['integrator']}: largest angle error {entry['largest_angle_error_rad']:.2g} rad "

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import reduce
+from operator import getitem
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
-from bench_report import ROOT
+from bench_report import REPETITIONS, ROOT
 
 from quasilpv.artifact import write_artifact
 from quasilpv.errors import InputError, QuasilpvError
@@ -66,6 +69,31 @@ def run_path(program: Path, *arguments: Path | str | int) -> Any:
     return json.loads(done.stdout)
 
 
+Documents: TypeAlias = list[Any]
+"""What the runs of one program printed, in the order of time."""
+
+
+def run_in_turns(runs: Mapping[str, Callable[[], Any]], *, quick: bool) -> dict[str, Documents]:
+    """Run every program, then every program again: whatever the machine does meanwhile meets them all.
+
+    Each run is a process of its own, so that what differs between processes (addresses, alignment) is in the spread.
+
+    Args:
+        runs: by name.
+        quick: once each.
+    """
+    documents: dict[str, Documents] = {name: [] for name in runs}
+    for _ in range(1 if quick else REPETITIONS):
+        for name, run in runs.items():
+            documents[name].append(run())
+    return documents
+
+
+def costs(documents: Documents, *keys: str | int, scale: float = 1.0) -> list[float]:
+    """One number of every run, at a path of keys, times a scale."""
+    return [scale * float(reduce(getitem, keys, document)) for document in documents]
+
+
 @dataclass(frozen=True)
 class Experiment:
     """Files of one experiment, in a folder of their own.
@@ -90,6 +118,11 @@ class Experiment:
             write_trajectory(folder / "trajectory.json", square),
             write_scenario(folder / "scenario.json", build_scenario(arm, square)),
         )
+
+    @property
+    def inputs(self) -> tuple[Path, Path]:
+        """Trajectory and scenario, as the programs take them."""
+        return self.trajectory, self.scenario
 
     def artifact(self, controller: str) -> Path:
         """Write the artifact of a controller at its default specification; a design made before is reused."""

@@ -13,8 +13,9 @@ from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -25,7 +26,12 @@ ROOT = Path(__file__).resolve().parents[2]
 KEPT = ROOT / "out" / "bench"
 HEADER = "ratio = competitor / ours: above 1 ours is the cheaper"
 
+REPETITIONS = 5
+"""How often what takes long is measured in one run, all of it in turns: what spreads is what the machine did."""
+
 Unit = Literal["ns", "us", "ms", "s", "MiB", "1"]
+Cost: TypeAlias = float | Sequence[float]
+"""A cost that was measured once, or the costs of its repetitions in the order of time."""
 
 
 @dataclass(frozen=True)
@@ -34,10 +40,11 @@ class Row:
 
     Attributes:
         name: what was measured.
-        value: how much of `unit` it took.
+        value: how much of `unit` it took, the median of its repetitions.
         unit: ns, us, ms or s; MiB; 1 of counts.
         against: the competitor measured in the same run, None if there is none.
         ratio: cost of the competitor over `value`, None if there is no competitor.
+        spread: largest over smallest median of the (at most five) parts of the run, None if it was measured once.
     """
 
     name: str
@@ -45,11 +52,30 @@ class Row:
     unit: Unit
     against: str | None = None
     ratio: float | None = None
+    spread: float | None = None
 
 
-def row(name: str, value: float, unit: Unit, against: tuple[str, float] | None = None) -> Row:
+def row(name: str, cost: Cost, unit: Unit, against: tuple[str, Cost] | None = None) -> Row:
     """The row of a cost beside that of a competitor, (its name, its cost in the same unit)."""
-    return Row(name, value, unit) if against is None else Row(name, value, unit, against[0], against[1] / value)
+    value = typical(cost)
+    if against is None:
+        return Row(name, value, unit, spread=spread_of(cost))
+    competitor, its_cost = against
+    return Row(name, value, unit, competitor, typical(its_cost) / value, spread_of(cost))
+
+
+def typical(cost: Cost) -> float:
+    """Median of the repetitions."""
+    return float(np.median(cost))
+
+
+def spread_of(cost: Cost) -> float | None:
+    """Largest over smallest median of consecutive parts, by time; None of a single measurement."""
+    repetitions = np.atleast_1d(cost)
+    if repetitions.size == 1:
+        return None
+    parts = [float(np.median(part)) for part in np.array_split(repetitions, min(REPETITIONS, repetitions.size))]
+    return max(parts) / min(parts)
 
 
 @dataclass(frozen=True)
@@ -60,11 +86,19 @@ class Report:
         rows: the costs.
         notes: what a reader must know to judge them: errors of what was timed, how, what could not be measured and why.
         packages: Python distributions whose version matters.
+        foreign: whether the competitors are not of this project: between two runs only the machine moves them.
     """
 
     rows: list[Row]
     notes: list[str] = field(default_factory=list)
     packages: Sequence[str] = ()
+    foreign: bool = False
+
+    def to_document(self) -> dict[str, Any]:
+        """What is kept of it."""
+        document = asdict(self)
+        del document["packages"]
+        return document
 
 
 def run_tool(layer: str, summary: str, measure: Callable[[bool], Report]) -> int:
@@ -81,25 +115,33 @@ def run_tool(layer: str, summary: str, measure: Callable[[bool], Report]) -> int
     parser = argparse.ArgumentParser(
         prog=f"tools/bench/{layer}", description=summary, epilog=f"{HEADER}. Kept in out/bench/{layer}.json."
     )
-    parser.add_argument("--json", action="store_true", help="print a list of {name, value, unit, against, ratio}")
+    parser.add_argument(
+        "--json", action="store_true", help="print a list of {name, value, unit, against, ratio, spread}"
+    )
     parser.add_argument("--quick", action="store_true", help="few repetitions, nothing is kept: a check of the tool")
     options = parser.parse_args()
-    try:
+
+    def measured() -> None:
         report = measure(options.quick)
         if not options.quick:
             keep(layer, report)
-    except DisagreementError as error:
-        print(error, file=sys.stderr)
-        return 1
-    except QuasilpvError as error:
-        print(error, file=sys.stderr)
-        return 2
-    present(layer, report, as_json=options.json)
-    return 0
+        present(layer, report, as_json=options.json)
+
+    return exit_code_of(measured)
 
 
 class DisagreementError(QuasilpvError):
     """Two implementations that are compared do not compute the same (exit code 1)."""
+
+
+def exit_code_of(work: Callable[[], None]) -> int:
+    """Exit code of a benchmark tool, its error on stderr: 0; 1 for a disagreement; 2 for bad input."""
+    try:
+        work()
+    except QuasilpvError as error:
+        print(error, file=sys.stderr)
+        return 1 if isinstance(error, DisagreementError) else 2
+    return 0
 
 
 def present(layer: str, report: Report, *, as_json: bool) -> None:
@@ -114,8 +156,13 @@ def present(layer: str, report: Report, *, as_json: bool) -> None:
 
 def print_table(layer: str, rows: Sequence[Row]) -> None:
     """Print rows on stdout, never narrower than their content when stdout is not a terminal."""
-    cells = [(r.name, f"{r.value:.4g}", r.unit, "" if r.ratio is None else f"{r.ratio:.3g}", r.against) for r in rows]
-    print_cells(f"{layer}: {HEADER}", ("", "value", "unit", "ratio", "competitor"), cells)
+    cells = [(r.name, f"{r.value:.4g}", r.unit, factor(r.spread), factor(r.ratio), r.against) for r in rows]
+    print_cells(f"{layer}: {HEADER}", ("", "value", "unit", "spread", "ratio", "competitor"), cells)
+
+
+def factor(value: float | None) -> str:
+    """A spread or a ratio as it is printed, nothing of one that there is not."""
+    return "" if value is None else f"{value:.3g}"
 
 
 def print_cells(title: str, headings: Sequence[str], rows: Sequence[Sequence[str | None]]) -> None:
@@ -130,8 +177,7 @@ def print_cells(title: str, headings: Sequence[str], rows: Sequence[Sequence[str
 
 def keep(layer: str, report: Report) -> None:
     """Write rows, notes and the circumstances of the measurement to ``out/bench/<layer>.json``."""
-    document = {"layer": layer, **circumstances(report.packages), **asdict(report)}
-    del document["packages"]
+    document = {"layer": layer, **circumstances(report.packages), **report.to_document()}
     KEPT.mkdir(parents=True, exist_ok=True)
     write_atomically({KEPT / f"{layer}.json": (json.dumps(document, indent=2) + "\n").encode()})
 

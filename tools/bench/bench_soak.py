@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from bench_programs import Experiment, run_program
+from bench_programs import Experiment, costs, run_program
 from bench_report import Report, main, row
 
 
@@ -15,7 +15,7 @@ def measure(quick: bool) -> Report:
         experiment = Experiment.write(Path(folder))
         artifact = experiment.artifact("dob-acceleration")
         result = run_program("soak_bench", artifact, experiment.trajectory, experiment.scenario, 6 if quick else 3600)
-    sample_us = result["cpu_ns_per_sample"] * 1e-3
+    sample_us = costs(result["cpu_ns_per_sample"], scale=1e-3)
     rows = [row("loop and plant, one sample", sample_us, "us", ("real time", 1e3))]
     return Report(
         rows,

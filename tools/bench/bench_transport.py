@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from bench_programs import run_program
+from functools import partial
+
+from bench_programs import costs, run_in_turns, run_program
 from bench_report import Report, main, row
 
 URL = "udpm://239.255.76.67:7691?ttl=0"  # a port of its own: no other run is disturbed or listened to
@@ -11,7 +13,8 @@ QUANTILES = {"p50": "p50_ns", "p99": "p99_ns", "p99.9": "p999_ns"}
 
 def measure(quick: bool) -> Report:
     """Time the round trips of both links."""
-    result = run_program("transport_bench", URL, 200 if quick else 20_000)
+    runs = {"link": partial(run_program, "transport_bench", URL, 200 if quick else 4000)}
+    measured = run_in_turns(runs, quick=quick)["link"]
     rows = []
     for name, key, other, other_key in (
         ("LCM", "lcm", "in-process", "in_process"),
@@ -20,21 +23,22 @@ def measure(quick: bool) -> Report:
         rows += [
             row(
                 f"{name} round trip {label}",
-                result[key][quantile] * 1e-3,
+                costs(measured, key, quantile, scale=1e-3),
                 "us",
-                (f"{other} round trip {label}", result[other_key][quantile] * 1e-3),
+                (f"{other} round trip {label}", costs(measured, other_key, quantile, scale=1e-3)),
             )
             for label, quantile in QUANTILES.items()
         ]
-    authentication = result["authentication"]
+    median_us = costs(measured, "in_process", "p50_ns", scale=1e-3)
     for name, key in (("tag of a measurement made", "sign"), ("tag of a measurement checked", "check")):
-        against = ("in-process round trip p50", result["in_process"]["p50_ns"] * 1e-3)
-        rows.append(row(name, authentication[key]["batch_ns"] * 1e-3, "us", against))
+        tag_us = costs(measured, "authentication", key, "batch_ns", scale=1e-3)
+        rows.append(row(name, tag_us, "us", ("in-process round trip p50", median_us)))
     notes = [
-        f"authenticated mode: {authentication['bytes']} bytes and their tag, CPU time per message, warm; a command is "
-        "shorter",
-        f"{result['samples']} round trips each, normal scheduling; measurements sent again: "
-        f"{result['lcm']['repeated']} over LCM, {result['in_process']['repeated']} in process",
+        f"authenticated mode: {measured[0]['authentication']['bytes']} bytes and their tag, CPU time per message, "
+        "warm; a command is shorter",
+        f"{sum(costs(measured, 'samples')):.0f} round trips each, normal scheduling; measurements sent again: "
+        f"{sum(costs(measured, 'lcm', 'repeated')):.0f} over LCM, "
+        f"{sum(costs(measured, 'in_process', 'repeated')):.0f} in process",
     ]
     return Report(rows, notes)
 
