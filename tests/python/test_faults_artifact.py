@@ -23,38 +23,44 @@ def flipped(data: bytes, bit: int) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def default_artifact(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with both twins of the default design."""
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Both twins of the default design."""
     folder = tmp_path_factory.mktemp("default")
     write_artifact(folder, release("arm3", DEFAULT_CONTROLLER, Specification()).artifact)
     return folder
 
 
+@pytest.fixture(params=["artifact.json", "artifact.cbor"])
+def twin(request: pytest.FixtureRequest, folder: Path) -> tuple[str, bytes]:
+    """Name and content of a file that the runtime accepts."""
+    data = (folder / request.param).read_bytes()
+    parse(data, request.param)
+    return request.param, data
+
+
+def parse(data: bytes, name: str) -> None:
+    pytest.importorskip("quasilpv._runtime").Artifact.parse(data, name)
+
+
 @pytest.mark.parametrize("flips", [1000, pytest.param(20000, marks=pytest.mark.full)])
-@pytest.mark.parametrize("twin", ["artifact.json", "artifact.cbor"])
 def test_F8_when_any_bit_of_the_default_artifact_is_flipped_expect_refusal_in_one_line(
-    default_artifact: Path, twin: str, flips: int
+    twin: tuple[str, bytes], flips: int
 ) -> None:
-    runtime = pytest.importorskip("quasilpv._runtime")
-    data = (default_artifact / twin).read_bytes()
-    runtime.Artifact.parse(data, twin)
-    chance = random.Random(flips)
-    for bit in chance.sample(range(8 * len(data)), flips):
-        with pytest.raises(InputError, match=rf"^{twin}: .*got .*, expected ") as refusal:
-            runtime.Artifact.parse(flipped(data, bit), twin)
+    name, data = twin
+    for bit in random.Random(flips).sample(range(8 * len(data)), flips):
+        with pytest.raises(InputError, match=rf"^{name}: .*got .*, expected ") as refusal:
+            parse(flipped(data, bit), name)
         assert "\n" not in str(refusal.value)
 
 
 @pytest.mark.parametrize("stride", [37, pytest.param(1, marks=pytest.mark.full)])
-@pytest.mark.parametrize("twin", ["artifact.json", "artifact.cbor"])
 def test_F8_when_the_default_artifact_is_truncated_at_any_byte_expect_refusal(
-    default_artifact: Path, twin: str, stride: int
+    twin: tuple[str, bytes], stride: int
 ) -> None:
-    runtime = pytest.importorskip("quasilpv._runtime")
-    data = (default_artifact / twin).read_bytes()
+    name, data = twin
     for size in range(0, len(data), stride):
         with pytest.raises(InputError):
-            runtime.Artifact.parse(data[:size], twin)
+            parse(data[:size], name)
 
 
 @pytest.mark.parametrize("side", ["controller", "simulator"])
@@ -64,7 +70,7 @@ def test_F8_when_a_damaged_artifact_is_given_expect_exit_2_one_line_and_nothing_
     path = experiment.folder / "artifact.json"
     data = path.read_bytes()
     chance = random.Random(88)
-    damages = [flipped(data, chance.randrange(8 * len(data))) for _ in range(20)]
+    damages = [flipped(data, chance.randrange(8 * len(data))) for _ in range(25)]
     damages += [data[: chance.randrange(len(data))] for _ in range(5)]
     for damaged in damages:
         path.write_bytes(damaged)
