@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from quasilpv.errors import InputError
 
@@ -67,3 +69,25 @@ def write_atomically(contents: Mapping[Path, bytes]) -> None:
     finally:
         for path in temporary.values():
             path.unlink(missing_ok=True)
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[BinaryIO]:
+    """A file to write that is too large to hold: it takes its place when the context ends, or never.
+
+    Args:
+        path: of the file; missing folders are made.
+
+    Raises:
+        InputError: the file cannot be written; nothing half-written is left behind.
+    """
+    partial = path.with_name(f".{path.name}-partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            yield file
+        partial.replace(path)
+    except OSError as error:
+        raise InputError(str(path), "file", error.strerror or error, "a writable file") from error
+    finally:
+        partial.unlink(missing_ok=True)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
+from quasilpv.artifact.files import written_whole
 from quasilpv.errors import InputError
 
 SUFFIX = ".lcmlog"
@@ -100,16 +101,8 @@ def write_events(path: Path, events: Iterable[Event]) -> Path:
     Raises:
         InputError: the file cannot be written; nothing half-written is left behind.
     """
-    partial = path.with_name(f".{path.name}-partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with partial.open("wb") as file:
-            writer = EventWriter(file)
-            for event in events:
-                writer.write(event)
-        partial.replace(path)
-    except OSError as error:
-        raise InputError(str(path), "file", error.strerror or error, "a writable file") from error
-    finally:
-        partial.unlink(missing_ok=True)
+    with written_whole(path) as file:
+        writer = EventWriter(file)
+        for event in events:
+            writer.write(event)
     return path

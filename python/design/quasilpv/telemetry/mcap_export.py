@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from quasilpv.errors import InputError
+from quasilpv.artifact.files import written_whole
 from quasilpv.telemetry.log import ARTIFACT, RunLog
 from quasilpv.telemetry.message_types import MessageType
 
@@ -26,17 +26,8 @@ def write_mcap(log: RunLog, path: Path) -> int:
     Raises:
         InputError: the file cannot be written.
     """
-    partial = path.with_name(f".{path.name}-partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with partial.open("wb") as file:
-            count = _write(log, Writer(file, compression=CompressionType.ZSTD))
-        partial.replace(path)
-    except OSError as error:
-        raise InputError(str(path), "file", error.strerror or error, "a writable file") from error
-    finally:
-        partial.unlink(missing_ok=True)
-    return count
+    with written_whole(path) as file:
+        return _write(log, Writer(file, compression=CompressionType.ZSTD))
 
 
 def _write(log: RunLog, writer: Writer) -> int:
