@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.conditions import i2, ii6
-from quasilpv.conditions.condition import Form, Options, Statement, Values
+from quasilpv.conditions.condition import Form, Options, Statement
 from quasilpv.conditions.ii8_direct import delayed_design
 from quasilpv.lmi import Problem, Solution, Variable, block
 from quasilpv.loops.state_law import descriptor_gain
@@ -79,23 +79,61 @@ def least_gain(problem: Problem, gains: Sequence[Variable], lyapunov: Sequence[A
     return solution if solution.verified else None
 
 
+@dataclass(frozen=True, eq=False)
+class _SingleSum:
+    """A condition of one sum over the vertices, solved with least gains.
+
+    Attributes:
+        statement: the condition.
+        solution: its verified solution.
+        lyapunov: P, (2n, 2n).
+        numerators: M_j, (count, n, 2n).
+    """
+
+    statement: Statement
+    solution: Solution
+    lyapunov: FloatArray
+    numerators: FloatArray
+
+    @classmethod
+    def of(cls, statement: Statement, lyapunov: str, numerator: str, count: int, rate: float) -> _SingleSum | None:
+        """Solve it; None without a verified solution.
+
+        Args:
+            statement: the condition.
+            lyapunov: name of P.
+            numerator: letter of M_j, which the index follows.
+            count: of vertices.
+            rate: w, 1/s.
+        """
+        P, M = _named(statement.problem, lyapunov), [_named(statement.problem, f"{numerator}{j}") for j in range(count)]
+        solution = least_gain(statement.problem, M, [P], rate)
+        if solution is None:
+            return None
+        return cls(statement, solution, _symmetric(solution.values[P]), np.stack([solution.values[Mj] for Mj in M]))
+
+    def witness(self, *names: str) -> dict[str, Any]:
+        """The values of these unknowns and of the slack matrices, JSON-able.
+
+        The slack is that of ``He(X) + T``; the inequalities are stated as ``X + T`` with the symmetric part of X.
+        """
+        values = self.solution.values
+        slack = [(values[T] + values[T].T).tolist() for T in self.statement.slacks]
+        return {name: values[_named(self.statement.problem, name)].tolist() for name in names} | {"slack": slack}
+
+
 def solve_pdc(model: PolytopicModel, decay: float, rate: float) -> Candidate | None:
     """Theorem I.2 as a single sum with one slack matrix per block; K_j = M_j P_11^-1."""
     statement = i2.with_gains(model, Options(decay_rate=decay), single=True)
-    problem = statement.problem
-    P11 = _named(problem, "P11")
-    M = [_named(problem, f"M{j}") for j in range(model.vertex_count)]
-    solution = least_gain(problem, M, [P11], rate)
-    if solution is None:
+    solved = _SingleSum.of(statement, "P11", "M", model.vertex_count, rate)
+    if solved is None:
         return None
-    values = solution.values
-    P = _symmetric(values[P11])
-    gains = np.linalg.solve(P, np.stack([values[Mj] for Mj in M]).swapaxes(1, 2)).swapaxes(1, 2)
-    witness = {"P": P, "P21": values[_named(problem, "P21")], "P22": values[_named(problem, "P22")]}
+    P = solved.lyapunov
+    gains = np.linalg.solve(P, solved.numerators.swapaxes(1, 2)).swapaxes(1, 2)
     return Candidate(
         law={"kind": "state-feedback", "gain": model.polytope.to_document(gains)},
-        witness=_lists(witness) | {"slack": _slack(statement, values)},
-        gain_limit=solution.objective,
+        witness={"P": P.tolist()} | solved.witness("P21", "P22"),
+        gain_limit=solved.solution.objective,
         gain=lambda weights, inertia: np.asarray(np.tensordot(weights, gains, axes=1)),
     )
 
@@ -103,24 +141,15 @@ def solve_pdc(model: PolytopicModel, decay: float, rate: float) -> Candidate | N
 def solve_descriptor(model: PolytopicModel, decay: float, rate: float) -> Candidate | None:
     """Theorem II.6 with common L and R, a single sum with one slack matrix per block."""
     statement = ii6.build(model, Options(decay_rate=decay, common=True, form=Form.PUBLISHED))
-    problem = statement.problem
-    unknown = _named(problem, "P")
-    F = [_named(problem, f"F{j}") for j in range(model.vertex_count)]
-    solution = least_gain(problem, F, [unknown], rate)
-    if solution is None:
+    solved = _SingleSum.of(statement, "P", "F", model.vertex_count, rate)
+    if solved is None:
         return None
-    values = solution.values
-    P, numerators = _symmetric(values[unknown]), np.stack([values[Fj] for Fj in F])
+    P, F = solved.lyapunov, solved.numerators
     return Candidate(
-        law={
-            "kind": "descriptor-feedback",
-            "numerator": model.polytope.to_document(numerators),
-            "lyapunov": P.tolist(),
-        },
-        witness=_lists({"L": values[_named(problem, "L")], "R": values[_named(problem, "R")]})
-        | {"slack": _slack(statement, values)},
-        gain_limit=solution.objective,
-        gain=lambda weights, inertia: descriptor_gain(np.tensordot(weights, numerators, axes=1), inertia, P),
+        law={"kind": "descriptor-feedback", "numerator": model.polytope.to_document(F), "lyapunov": P.tolist()},
+        witness=solved.witness("L", "R"),
+        gain_limit=solved.solution.objective,
+        gain=lambda weights, inertia: descriptor_gain(np.tensordot(weights, F, axes=1), inertia, P),
     )
 
 
@@ -149,14 +178,5 @@ def solve_delayed(model: PolytopicModel, decay: float, rate: float) -> Candidate
     return Candidate(law, {"window_s": WINDOW_S}, solution.objective, gain)
 
 
-def _slack(statement: Statement, values: Values) -> list[Any]:
-    """The slack of ``He(X) + T``; the inequalities are stated as ``X + T`` with the symmetric part of X."""
-    return [(values[T] + values[T].T).tolist() for T in statement.slacks]
-
-
 def _symmetric(square: FloatArray) -> FloatArray:
     return np.asarray((square + square.T) / 2.0)
-
-
-def _lists(matrices: Mapping[str, FloatArray]) -> dict[str, Any]:
-    return {name: matrix.tolist() for name, matrix in matrices.items()}
