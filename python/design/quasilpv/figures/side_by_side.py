@@ -20,6 +20,7 @@ from quasilpv.figures.style import (
     REFERENCE_COLOUR,
     VERMILION,
     legend_above,
+    legend_below,
     length_unit,
     new_figure,
     style,
@@ -46,7 +47,7 @@ def tracking_columns(results: Mapping[str, TrackResult], title: str) -> Figure:
                 axes.set_ylabel(f"{name} error ({unit.name})")
                 axes.set_title(f"rms {np.sqrt(np.mean(shown**2)):.3g}, max {np.abs(shown).max():.3g} {unit.name}")
                 label_time(axes, result.run.time_s)
-        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        legend_below(grid[0, 0], columns=2)
         return figure
 
 
@@ -73,7 +74,7 @@ def input_columns(results: Mapping[str, TrackResult], title: str) -> Figure:
             axes.set_ylabel(f"torque {joint + 1} (N m)")
         grid[-1, 0].set_ylabel("speed error (rad/s)")
         figure.align_ylabels()
-        figure.legend(*grid[-1, 0].get_legend_handles_labels(), loc="outside lower center", ncols=joints)
+        legend_below(grid[-1, 0], columns=joints)
         return figure
 
 
@@ -118,10 +119,7 @@ def disturbance_estimates(results: Mapping[str, TrackResult], joint: int, title:
         for axes, (label, result) in zip(
             figure.subplots(len(results), 1, sharex=True, squeeze=False)[:, 0], results.items(), strict=True
         ):
-            disturbance = result.true_disturbance
-            if disturbance is None:
-                raise ValueError(f"{result.variant.controller} estimates no disturbance")
-            rms = plot_disturbance(axes, result, disturbance, joint)
+            rms = plot_disturbance(axes, result, joint)
             axes.set_title(f"{label}: rms of the difference {rms}")
             legend_above(axes)
         label_time(axes, result.run.time_s)

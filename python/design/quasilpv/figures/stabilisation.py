@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from quasilpv.experiments.run import FloatArray, Run
 from quasilpv.figures.constraint import SMALLEST_DRAWN
-from quasilpv.figures.style import BLUE, JOINT_COLOURS, REFERENCE_COLOUR, new_figure, style
+from quasilpv.figures.style import BLUE, JOINT_COLOURS, REFERENCE_COLOUR, legend_below, new_figure, style
 from quasilpv.figures.tracking import label_time, plot_joints
 
 
@@ -37,7 +37,7 @@ def regulation_figure(run: Run, lyapunov: FloatArray, decay_per_s: float, title:
         )
         energy.set_ylabel("Lyapunov function V")
         energy.legend()
-        figure.legend(*angle.get_legend_handles_labels(), loc="outside lower center", ncols=run.joints)
+        legend_below(angle, columns=run.joints)
         for axes in (torque, energy):
             label_time(axes, run.time_s)
         return figure

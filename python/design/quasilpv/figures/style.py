@@ -93,6 +93,11 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, handlelength=2.2)
 
 
+def legend_below(axes: Axes, columns: int) -> None:
+    """The legend of ``axes``, which is that of every plot of its figure, below them all."""
+    axes.figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns)
+
+
 @dataclass(frozen=True)
 class Unit:
     """A unit that keeps the numbers on an axis readable: ``shown = si_value * factor``."""

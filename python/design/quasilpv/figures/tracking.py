@@ -88,15 +88,13 @@ def disturbance_figure(result: TrackResult) -> Figure:
     Raises:
         ValueError: the law of the run estimates no disturbance.
     """
-    disturbance = result.true_disturbance
-    if disturbance is None:
-        raise ValueError(f"{result.variant.controller} estimates no disturbance")
+    quantity = _true_disturbance(result).quantity
     with style():
         figure = new_figure(
-            1.7 * result.run.joints + 0.6, f"{result.title}: disturbance as {disturbance.quantity}, and its estimate"
+            1.7 * result.run.joints + 0.6, f"{result.title}: disturbance as {quantity}, and its estimate"
         )
         for joint, axes in enumerate(figure.subplots(result.run.joints, 1, sharex=True, squeeze=False)[:, 0]):
-            axes.set_title(f"rms of the difference {plot_disturbance(axes, result, disturbance, joint)}")
+            axes.set_title(f"rms of the difference {plot_disturbance(axes, result, joint)}")
             if joint == 0:
                 legend_above(axes)
         figure.align_ylabels()
@@ -118,13 +116,24 @@ def velocity_figure(result: TrackResult) -> Figure:
         return figure
 
 
-def plot_disturbance(axes: Axes, result: TrackResult, disturbance: Disturbance, joint: int) -> str:
-    """Draw the true disturbance on one joint and its estimate; return the rms of their difference with its unit."""
+def plot_disturbance(axes: Axes, result: TrackResult, joint: int) -> str:
+    """Draw the true disturbance on one joint and its estimate; return the rms of their difference with its unit.
+
+    Raises:
+        ValueError: the law of the run estimates no disturbance.
+    """
+    disturbance = _true_disturbance(result)
     true, estimate = disturbance.values[:, joint], result.run.filtered_disturbance[:, joint]
     axes.plot(result.run.time_s, estimate, color=ORANGE, linewidth=1.8, label="estimate")
     axes.plot(result.run.time_s, true, color=BLACK, linewidth=0.7, label="true")
     axes.set_ylabel(f"joint {joint + 1} ({disturbance.unit})")
     return f"{np.sqrt(np.mean((estimate - true) ** 2)):.3g} {disturbance.unit}"
+
+
+def _true_disturbance(result: TrackResult) -> Disturbance:
+    if result.true_disturbance is None:
+        raise ValueError(f"{result.variant.controller} estimates no disturbance")
+    return result.true_disturbance
 
 
 def plot_joints(axes: Axes, time_s: FloatArray, values: FloatArray, linewidth: float = 0.9) -> None:

@@ -7,7 +7,7 @@ from math import log
 
 from matplotlib.figure import Figure
 
-from quasilpv.figures.style import BLUE, GREEN, ORANGE, VERMILION, new_figure, style
+from quasilpv.figures.style import BLUE, GREEN, ORANGE, VERMILION, legend_below, new_figure, style
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.complexity_tables import UNPUBLISHED, bouarar_rows, he_rows
 from quasilpv.reproduction.item import Effort, Finding, Item
@@ -107,7 +107,7 @@ def _figure(rows: dict[str, Formula], unknowns: dict[str, Formula]) -> Figure:
             panel.set_xlabel("number of premises r")
             panel.set_ylabel(f"{label} (count)")
             panel.set_xticks(range(2, PREMISES + 1, 2))
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        legend_below(panels[0], columns=4)
     return figure
 
 

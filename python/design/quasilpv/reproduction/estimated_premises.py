@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from quasilpv.conditions.mismatch import FloatArray
 from quasilpv.errors import InfeasibleError
-from quasilpv.figures.style import BLUE, GREEN, ORANGE, VERMILION, new_figure, style
+from quasilpv.figures.style import BLUE, GREEN, ORANGE, VERMILION, legend_below, new_figure, style
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.item import Effort, Finding, Item
 from quasilpv.scenarios import tracking_task
@@ -224,8 +224,7 @@ def _errors_figure(time_s: FloatArray, errors: dict[str, dict[str, FloatArray]])
             axes.set_xlabel("time (s)")
             axes.set_ylim(1e-8, 10.0)
         panels[0].set_ylabel("speed error (rad/s)")
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        legend_below(panels[0], columns=2)
         return figure
 
 
