@@ -14,9 +14,11 @@ from quasilpv import _runtime
 from quasilpv.artifact import Artifact, read_artifact, summary, write_artifact
 from quasilpv.artifact.envelope import OperatingEnvelope
 from quasilpv.experiments.result import Variant
+from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.figures.envelope import envelope_figure
 from quasilpv.figures.gallery import write_gallery
 from quasilpv.release import release
+from quasilpv.scenarios import Sensors
 from quasilpv.synthesis import Specification
 from reference.runs import synthetic_result
 from test_figures import assert_readable
@@ -92,3 +94,23 @@ def test_when_the_run_has_an_envelope_expect_its_figure_in_the_gallery_and_else_
         envelope_figure(result)
     files = write_gallery(replace(result, envelope=envelope(KINDS[0])), tmp_path)
     assert sum(file.stem == "envelope" for file in files) == 2
+
+
+@pytest.mark.full
+def test_when_encoders_are_exact_expect_the_settled_run_in_its_peak_set_and_beyond_it_otherwise(
+    tmp_path: Path,
+) -> None:
+    design = release("arm3", "dob-acceleration", Specification()).artifact
+    square = TrackingExperiment.registered("serial-square")
+    for bits, is_inside in ((0, True), (20, False)):
+        result = track(square, design, tmp_path, plant="perturbed", sensors=Sensors(encoder_bits=bits), log=False)
+        assert result.envelope is not None
+        peak_set, run = result.envelope.peak, result.run
+        errors = np.stack(
+            [run.true_angle_rad - run.reference_angle_rad, run.true_speed_rad_s - run.reference_speed_rad_s]
+        )
+        for joint in range(3):
+            peak = np.abs(errors[0, :, joint]).max() / peak_set.angle_bound_rad[joint]
+            settled = errors[:, run.time_s > 0.1, joint]
+            sizes = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(peak_set.covariance[joint]), settled), axis=0)
+            assert (sizes.max() <= peak) == is_inside

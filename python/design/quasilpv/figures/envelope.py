@@ -19,7 +19,8 @@ def envelope_figure(result: TrackResult) -> Figure:
 
     Left: the angle, the tube ``r +- margin`` in which the errors of the box set stay, and the border of the domain.
     Middle: the errors of angle and speed against the torque set. Right: the same, closer, against the peak set of the
-    smallest peak that accounts for the run's angle error, printed beside the largest peak the margin allows.
+    smallest peak that accounts for the run's angle error, printed beside the largest peak the margin allows; a dot is a
+    sample, for a line between samples would be a scribble.
 
     Args:
         result: the run.
@@ -40,6 +41,7 @@ def envelope_figure(result: TrackResult) -> Figure:
             _plot_peak_set(close, result, envelope, joint)
             tube.set_ylabel(f"joint {joint + 1} (rad)")
             wide.set_ylabel("speed error (rad/s)")
+            close.set_ylabel("speed error (rad/s)")
         tube.set_xlabel("time (s)")
         wide.set_xlabel("angle error (mrad)")
         close.set_xlabel("angle error (µrad)")
@@ -81,7 +83,7 @@ def _plot_peak_set(axes: Axes, result: TrackResult, envelope: OperatingEnvelope,
     border = envelope.peak.border(joint, peak)
     axes.fill(1e6 * border[:, 0], border[:, 1], facecolor=VERMILION, alpha=0.12)
     axes.plot(1e6 * border[:, 0], border[:, 1], color=VERMILION, label="peak set that spans the run's angle error")
-    axes.plot(1e6 * angle, speed, color=BLUE, linewidth=0.4)
+    axes.plot(1e6 * angle, speed, color=BLUE, linestyle="", marker=".", markersize=1.6, alpha=0.5, markeredgewidth=0)
     allowed = envelope.peak.largest_scale(envelope.reference_margin_rad)[joint]
     axes.set_title(f"peak {_number(peak)} {envelope.peak_unit},\nmargin allows {_number(allowed)}", fontsize=8.0)
 

@@ -23,7 +23,8 @@ DEFAULT_PORT = 8080
 PLOT_PERIOD_S = 0.12
 _PANEL_WIDTH = 400
 _PLOT_HEIGHT = 104
-_AXES = (uplot.Axis(size=26), uplot.Axis(size=54))
+_AXES = (uplot.Axis(size=26), uplot.Axis(size=60, space=18))
+"""Room for labels as wide as "1,000"; on the vertical axis a tick every 18 pixels or more: two at least on a plot."""
 _PADDING = (6, 14, 0, 0)
 _TIME_STEPS = 1000
 
@@ -212,7 +213,7 @@ def _serve(port: int) -> viser.ViserServer:
 def _legend(joints: int) -> str:
     """The colours of the joints, which all plots share; premises have the same in their order."""
     names = (f'<span style="color:{JOINT_COLOURS[k]}">&#9632; joint {k + 1}</span>' for k in range(joints))
-    return f'<div style="font-size:0.8em; padding:0 1em">{" &nbsp; ".join(names)}</div>'
+    return f'<div style="font-size:0.8em; padding:0 1em">{" &nbsp; ".join(names)} &nbsp; over time in s</div>'
 
 
 def _quiet() -> contextlib.redirect_stdout[io.StringIO]:
