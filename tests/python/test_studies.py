@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from quasilpv.cli import run
 from quasilpv.conditions.condition import Options
 from quasilpv.errors import InputError
 from quasilpv.lmi.compiled import CompiledProblem
@@ -231,6 +232,24 @@ class TestCommands:
         for options in ((), ("--representation", "ts"), ("--slack", "full")):
             assert self.design("region", "ex-I.1", "-c", "II.6", *axes, *options).returncode == 0
         assert len(list(tmp_path.glob("ex-I.1-II.6-*.json"))) == 3
+
+    def test_maps_of_one_question_over_other_ranges_share_answers_and_keep_their_files(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        def mapped(x: str, *options: str) -> dict[Path, bytes]:
+            axes = ("--x", x, "--y", "b=-4:8:2", "-j", "1", "-o", str(tmp_path))
+            assert run(["region", "ex-I.1", "-c", "II.6", *axes, *options]) == 0
+            return {path: path.read_bytes() for path in tmp_path.iterdir() if path.suffix != ".jsonl"}
+
+        made = mapped("a=-2:6:3")
+        for number, change in enumerate((("a=-2:6:5",), ("a=-2:2:3",), ("a=-2:6:5", "--grid")), start=2):
+            more = mapped(*change)
+            assert made.items() <= more.items()
+            assert len(more) == 3 * number  # JSON, PNG, SVG
+            made = more
+        assert mapped("a=-2:6:3").keys() == made.keys()
+        assert len(list(tmp_path.glob("*.jsonl"))) == 1
+        assert "points known from" in capsys.readouterr().err
 
     @pytest.mark.parametrize(
         ("arguments", "words"),

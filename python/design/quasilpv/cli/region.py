@@ -55,7 +55,7 @@ def region_command(
         steps.begin("points")
         evaluation = Map(asked, across, up, solver=solver, memory=memory, progress=steps.parts)
         region = evaluation.full() if grid else evaluation.adaptive()
-    written = _write(region, memory.path.with_suffix(""))
+    written = _write(region, memory.map_stem(across, up, full=grid))
     if json:
         print_json(region.to_document())
         return
@@ -66,7 +66,7 @@ def region_command(
 
 
 def _write(region: Region, stem: Path) -> list[Path]:
-    """The map and its figure beside its checkpoint, whose name tells questions apart."""
+    """The map and its figure."""
     document = stem.with_name(f"{stem.name}.json")
     write_readable_json(document, region.to_document())
     return [document, *save(region_figure([region]), stem)]

@@ -6,9 +6,11 @@ import hashlib
 import json
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from quasilpv.errors import InputError
 from quasilpv.studies.question import Answer, Question, Verdict
+from quasilpv.studies.region import Axis
 
 
 class Forgetful:
@@ -28,7 +30,7 @@ class Checkpoint:
     Args:
         folder: where the file lies; made if it is missing.
         question: of the map.
-        swept: names of its parameters: file names tell maps apart by a hash of both.
+        swept: names of its parameters: file names tell questions apart by a hash of both.
 
     Raises:
         InputError: the folder or the file cannot be written, or the file holds something else.
@@ -36,9 +38,8 @@ class Checkpoint:
 
     def __init__(self, folder: Path, question: Question, swept: tuple[str, str]) -> None:
         """Read what is there."""
-        identity = json.dumps([question.to_document(), swept], sort_keys=True)
-        digest = hashlib.sha256(identity.encode()).hexdigest()[:16]
-        self.path = folder / f"{question.system}-{question.condition}-{digest}.jsonl"
+        identity = _digest([question.to_document(), swept], 16)
+        self.path = folder / f"{question.system}-{question.condition}-{identity}.jsonl"
         self._known: dict[tuple[float, float], Answer] = {}
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -51,6 +52,15 @@ class Checkpoint:
     def size(self) -> int:
         """Number of answers kept."""
         return len(self._known)
+
+    def map_stem(self, x: Axis, y: Axis, *, full: bool) -> Path:
+        """Where a map made of these answers is written, without suffix: maps of a question are told apart by a hash.
+
+        Args:
+            x, y: its axes.
+            full: every point of the grid, or the refined ones only.
+        """
+        return self.path.with_name(f"{self.path.stem}-{_digest([asdict(x), asdict(y), full], 8)}")
 
     def get(self, place: tuple[float, float]) -> Answer | None:
         """The answer at a point, if it is known."""
@@ -79,3 +89,7 @@ class Checkpoint:
                 raise InputError(
                     str(self.path), f"line {number}", line[:60].decode("utf-8", "replace"), "an answer of a map"
                 ) from None
+
+
+def _digest(identity: Any, digits: int) -> str:
+    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:digits]
