@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -37,6 +38,17 @@ def test_every_place_that_says_the_version_says_the_same() -> None:
     minor = version.rpartition(".")[0]
     downstream = (ROOT / "examples/downstream/CMakeLists.txt").read_text(encoding="utf-8")
     assert f"find_package(quasilpv {minor} REQUIRED)" in downstream
+
+
+def runtime_packages() -> set[str]:
+    text = (ROOT / "tools/packages/apt-runtime.txt").read_text(encoding="utf-8")
+    return {line.split()[0] for line in text.splitlines() if not line.startswith("#")}
+
+
+def test_the_installation_guide_names_the_packages_of_the_list() -> None:
+    guide = (ROOT / "docs/how-to/install.md").read_text(encoding="utf-8")
+    [line] = [line for line in guide.splitlines() if line.startswith("apt-get install ")]
+    assert set(line.partition("#")[0].split()[2:]) == runtime_packages()
 
 
 # ---- the wheel -------------------------------------------------------------------------------------------------------
@@ -78,6 +90,21 @@ def test_when_the_wheel_is_installed_alone_expect_no_headers_and_no_archives_in_
     listed = run(sys.executable, "-m", "zipfile", "--list", wheel, cwd=clean_environment)
     assert "quasilpv/_runtime" in listed
     assert not any(suffix in listed for suffix in (".hpp", ".a ", ".cmake"))
+
+
+@pytest.mark.full
+@pytest.mark.skipif(shutil.which("dpkg-query") is None, reason="not a Debian system")
+def test_the_libraries_that_the_wheel_links_are_those_of_the_listed_packages(clean_environment: Path) -> None:
+    [extension] = clean_environment.glob("lib/*/site-packages/quasilpv/_runtime*.so")
+    programs = [extension, *clean_environment.glob("bin/qlpv-*")]
+    dynamic = run("readelf", "--dynamic", "--wide", *programs, cwd=clean_environment)
+    libraries = set(re.findall(r"\(NEEDED\).*\[(lib[^]]+)\]", dynamic))
+    owners = run(
+        "dpkg-query", "--search", *(f"*-linux-gnu/{name}" for name in sorted(libraries)), cwd=clean_environment
+    )
+    packages = {line.split(":")[0] for line in owners.splitlines()} - {"libc6", "libgcc-s1", "libstdc++6"}
+    assert len(programs) == 3
+    assert packages == runtime_packages() - {"python3-venv"}
 
 
 @pytest.mark.full
