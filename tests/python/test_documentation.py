@@ -23,6 +23,7 @@ from quasilpv.cli.verbs import VERBS
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("[!_]*.md"), *(ROOT / "docs").glob("[!_]*/*.md")])
+README = ROOT / "README.md"
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 
 # Quick enough for every run; all other lines are run, page by page and in order, by ./tools/test --full.
@@ -128,6 +129,25 @@ def test_the_commands_of_a_page_run_in_their_order(name: str, tmp_path: Path, mo
             assert_runs(line)
 
 
+@pytest.mark.full
+def test_the_table_of_the_readme_is_what_the_demo_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    [table] = [fence.text for fence in fences(README) if fence.language == "text"]
+    assert_runs("design demo")
+    printed = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+    assert len(table.splitlines()) > 20
+    assert [line for line in table.splitlines() if line not in printed] == []
+
+
+def test_the_boundary_beside_a_command_of_the_readme_is_the_one_it_finds(capsys: pytest.CaptureFixture[str]) -> None:
+    [line] = [line for line in README.read_text(encoding="utf-8").splitlines() if line.startswith("design boundary ")]
+    command, _, found = line.partition("#")
+    assert_runs(command)
+    assert found.strip() in capsys.readouterr().out
+
+
 def test_every_line_of_a_console_block_is_run_or_listed_with_a_reason() -> None:
     lines = [line for page in PAGES for line in console_lines(page)]
     assert [line for line in lines if not line.startswith("design ") and not is_skipped(line)] == []
@@ -194,7 +214,7 @@ def test_every_internal_link_of_a_page_leads_somewhere(name: str) -> None:
 
 
 def test_when_a_file_or_a_heading_is_missing_expect_a_broken_link() -> None:
-    page = ROOT / "README.md"
+    page = README
     assert broken_link(page, "docs/concepts/nowhere.md")
     assert broken_link(page, "docs/concepts/polytopes.md#nothing")
     assert not broken_link(page, "docs/concepts/polytopes.md#what-it-loses-the-matrix-cube")
