@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
 
 from quasilpv.conditions import estimated_observer
-from quasilpv.conditions.condition import Options
+from quasilpv.conditions.condition import Feedback, Options
 from quasilpv.conditions.mismatch import inner_bounded, lipschitz, with_one_sided
 from quasilpv.conditions.registry import condition
 from quasilpv.errors import InfeasibleError, InputError
@@ -18,6 +19,7 @@ from quasilpv.studies.velocity_classes import VelocityClasses
 from quasilpv.synthesis.speed_observer import SpeedObserver, speed_observer
 from quasilpv.systems.catalogue import system
 from quasilpv.systems.registry import robot
+from reference.mutants import Mutant
 
 OPTIONS = Options(decay_rate=5.0, sample_period_s=1e-3)
 
@@ -59,6 +61,53 @@ def test_error_contracts_for_every_pair_of_states_of_the_domain() -> None:
         following = (x - estimate) + np.linalg.solve(E, drift - law.observer(z) @ C @ (x - estimate))
         before = np.linalg.norm(norm @ (x - estimate))
         assert np.linalg.norm(norm @ following) < np.exp(-OPTIONS.decay_rate * h) * before
+
+
+def worst_step(model: PolytopicModel, law: Feedback, options: Options) -> float:
+    """Largest factor on small errors per step over the promised one, at the corners of the speeds: no class is used.
+
+    ``|| N (I + E^-1 (h df/dx - L C)) N^-1 || exp(alpha h)`` with N'N = Q and f(x) = A(z(x)) x, theta measured. f is
+    quadratic in the speeds, so central differences are its derivative.
+    """
+    plant, h, worst = model.system, options.sample_period_s, 0.0
+    norm = np.linalg.cholesky(np.linalg.inv(law.lyapunov)).T
+    first, second, *speeds = plant.domain.values()
+    for theta, *omega in product(np.linspace(*second, 9), *speeds):
+        x = np.array([sum(first) / 2.0, theta, *omega])
+        z = plant.premise_values(x)
+        E, jacobian, _, C = plant.evaluate(z)
+        for column in np.eye(4)[2:]:
+            ahead, behind = (plant.evaluate(plant.premise_values(y)).A @ y for y in (x + column, x - column))
+            jacobian = jacobian + np.outer((ahead - behind) / 2.0 - jacobian @ column, column)
+        assert law.observer is not None
+        step = np.eye(4) + np.linalg.solve(E, h * jacobian - law.observer(z) @ C)
+        worst = max(worst, float(np.linalg.norm(norm @ step @ np.linalg.inv(norm), 2)))
+    return worst * np.exp(options.decay_rate * h)
+
+
+CLASS_TERM = "he(X) + Q * rate + ee"
+CLASS_WEIGHT = "drive[j] * t, pp]"
+CLASS_ERRORS = [
+    (Mutant("class in e", CLASS_TERM, "he(X) + Q * rate"), 5e-3),
+    (Mutant("class in e, sign", CLASS_TERM, "he(X) + Q * rate - ee"), 5e-3),
+    (Mutant("class in p", CLASS_WEIGHT, "drive[j] * t, pp * 100]"), 5e-3),
+    (Mutant("p in the error", "drive[j] + pe", "pe"), 1e-3),
+]
+
+
+@pytest.mark.parametrize(("mutant", "period_s"), CLASS_ERRORS, ids=lambda entry: getattr(entry, "block", ""))
+def test_when_the_builder_errs_in_the_class_expect_an_error_that_does_not_decay_as_promised(
+    monkeypatch: pytest.MonkeyPatch, mutant: Mutant, period_s: float
+) -> None:
+    model, options = arm2(), replace(OPTIONS, decay_rate=0.5, sample_period_s=period_s)
+    steps = []
+    for builder in (estimated_observer, mutant.loaded(monkeypatch, estimated_observer.__name__)):
+        statement = builder.build(model, options)
+        decision = decide(CompiledProblem.of(statement.problem))
+        assert decision.feasible
+        steps.append(worst_step(model, statement.feedback(decision.values), options))
+    sound, wrong = steps
+    assert sound < 1.0 < wrong
 
 
 def test_class_of_the_catalogue_system_holds_its_sampled_differences() -> None:
