@@ -30,10 +30,13 @@ def lyapunov(A: np.ndarray) -> Problem:
 
 
 def random_problem(seed: int) -> Problem:
-    """Two inequalities in a symmetric, a rectangular and a scalar unknown, with data of all kinds of number."""
+    """Two inequalities in a symmetric, a rectangular and a scalar unknown, with data of all kinds of number.
+
+    They hold at P = 5 I, Y = 0, t = 1, since |A + 9 I| <= 27/7 and the random matrices are small beside 5 He(A).
+    """
     rng = np.random.default_rng(seed)
     P, Y, t = Variable("P", 3, symmetric=True), Variable("Y", 2, 3), Variable("t", 1)
-    A, B = rng.integers(-9, 9, (3, 3)) * Fraction(1, 7), rng.standard_normal((3, 2))
+    A, B = rng.integers(-9, 9, (3, 3)) * Fraction(1, 7) - 9 * np.eye(3, dtype=int), rng.standard_normal((3, 2))
     problem = Problem()
     problem.positive("first", block([[P - A @ Y.T @ B.T, None], [Y, t * np.eye(2, dtype=int)]]))
     problem.negative("second", he(A @ P + B @ Y) - t * rng.standard_normal((3, 3)))
@@ -64,16 +67,19 @@ def test_integer_check_agrees_with_rational_evaluation_of_the_expressions(seed: 
     problem = random_problem(seed)
     compiled = CompiledProblem.of(problem)
     rng = np.random.default_rng(seed)
-    verdicts = set()
-    for spread in (0.0, 0.1, 10.0):
+    verdicts = []
+    for spread, sign in ((0.0, 1.0), (0.0, -1.0), (0.1, 1.0), (1.0, 1.0), (10.0, 1.0)):
         values = {v: spread * rng.standard_normal((v.rows, v.cols)) for v in problem.variables}
         for v in problem.variables:
             if v.symmetric:
-                values[v] = values[v] + values[v].T + 5 * np.eye(v.rows)
+                values[v] = values[v] + values[v].T + sign * 5 * np.eye(v.rows)
+            elif v.size == 1:
+                values[v] = values[v] + sign
         point = np.concatenate([_packed(v, values[v]) for v in problem.variables])
         full = replace(compiled, layout=replace(compiled.layout, kept=np.arange(point.size)))
-        assert full.holds_exactly(point) == problem.holds_exactly(values)
-        verdicts.add(full.holds_exactly(point))
+        verdicts.append(full.holds_exactly(point))
+        assert verdicts[-1] == problem.holds_exactly(values)
+    assert verdicts[:2] == [True, False]
 
 
 def _packed(variable: Variable, value: np.ndarray) -> np.ndarray:
