@@ -275,7 +275,9 @@ TEST(LcmLink, when_packets_could_leave_the_machine_expect_refusal_without_a_flag
 TEST(LcmLink, when_the_url_is_malformed_expect_one_line_that_says_so) {
   for (const char* url : {"", "udpm://", "memq://", "tcpq://127.0.0.1:7700", "udpm://127.0.0.1:7667?ttl=0",
                           "udpm://239.255.76.67:7667?ttl=-1", "udpm://239.255.76.67:70000?ttl=0",
-                          "udpm://239.255.76.67:7667?ttl=256", "udpm://239.255.76.67:7667?ttl=0&ttl=1"}) {
+                          "udpm://239.255.76.67:7667?ttl=256", "udpm://239.255.76.67:7667?ttl=0&ttl=1",
+                          "udpm://239.255.76.67", "udpm://239.255.76.67:", "udpm://239.255.76.67:7667?ttl=",
+                          "udpm://239.255.76.67:7667?", "udpm://239.255.76.67:7667 ", "udpm://239.255:76:7667"}) {
     const std::string refusal = refusal_of(url, true);
     EXPECT_THAT(refusal, HasSubstr("expected")) << url;
     EXPECT_EQ(refusal.find('\n'), std::string::npos) << url;

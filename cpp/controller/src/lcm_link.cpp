@@ -11,8 +11,8 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
-#include <regex>
 #include <string>
+#include <string_view>
 
 #include "quasilpv/errors.hpp"
 #include "quasilpv/realtime.hpp"
@@ -40,18 +40,38 @@ int parse_bounded(const std::string& digits, int high, const std::string& url, c
   return value;
 }
 
+/// Takes `expected` off the front of `text`; false if it does not begin so.
+bool take(std::string_view& text, std::string_view expected) {
+  const bool begins = text.substr(0, expected.size()) == expected;
+  text.remove_prefix(begins ? expected.size() : 0);
+  return begins;
+}
+
+/// Takes the characters of `allowed` off the front of `text`.
+std::string take_all_of(std::string_view& text, std::string_view allowed) {
+  const std::string_view taken = text.substr(0, text.find_first_not_of(allowed));
+  text.remove_prefix(taken.size());
+  return std::string(taken);
+}
+
 MulticastAddress parse_url(const std::string& url) {
-  static const std::regex kForm(R"(udpm://([0-9.]+):([0-9]+)(?:\?ttl=([0-9]+))?)");
+  constexpr std::string_view kDigits = "0123456789";
   constexpr int kMaxPort = 65535;
   constexpr int kMaxTimeToLive = 255;
-  std::smatch parts;
+  std::string_view rest = url;
+  const bool is_multicast_scheme = take(rest, "udpm://");
+  const std::string group = take_all_of(rest, "0123456789.");
+  const bool has_port = take(rest, ":");
+  const std::string port = take_all_of(rest, kDigits);
+  const bool has_time_to_live = take(rest, "?ttl=");
+  const std::string time_to_live = take_all_of(rest, kDigits);
   MulticastAddress address;
-  if (!std::regex_match(url, parts, kForm) || inet_aton(parts[1].str().c_str(), &address.group) == 0 ||
-      !IN_MULTICAST(ntohl(address.group.s_addr))) {
+  if (!is_multicast_scheme || !has_port || port.empty() || has_time_to_live == time_to_live.empty() || !rest.empty() ||
+      inet_aton(group.c_str(), &address.group) == 0 || !IN_MULTICAST(ntohl(address.group.s_addr))) {
     throw InputError("command line", "url", "'" + url + "'", kUrlForm);
   }
-  address.port = parse_bounded(parts[2].str(), kMaxPort, url, "port");
-  address.time_to_live = parts[3].matched ? parse_bounded(parts[3].str(), kMaxTimeToLive, url, "ttl") : 0;
+  address.port = parse_bounded(port, kMaxPort, url, "port");
+  address.time_to_live = has_time_to_live ? parse_bounded(time_to_live, kMaxTimeToLive, url, "ttl") : 0;
   return address;
 }
 
