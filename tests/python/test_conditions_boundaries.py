@@ -1,7 +1,7 @@
 """How far conditions reach on the published examples, and how large they are, against independent numbers.
 
-The limits were found with other software (YALMIP and SeDuMi, cvxpy) for the corrected statements, or derived. A limit is confirmed
-by a feasible point, proved in exact arithmetic, just inside and an infeasible one just outside.
+The limits were found with other software (YALMIP and SeDuMi, cvxpy) for the corrected statements, or derived by hand. A
+limit is confirmed by a feasible point, proved in exact arithmetic, just inside and an infeasible one just outside.
 """
 
 from dataclasses import dataclass, field
