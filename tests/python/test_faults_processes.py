@@ -33,7 +33,10 @@ SAFE_S = 0.05
 """From the fault to the safe torque."""
 SCHEDULER_SLACK_S = 0.2
 """What a busy machine may add to a time of the monotonic clock."""
-REAL_TIME = ("--mode", "realtime")
+STALLS = 10
+"""So often a busy machine may stop both processes for longer than the watchdogs allow."""
+REAL_TIME = ("--mode", "realtime", "--priority", "50")
+"""With the privileges of real time where they are granted: fewer stalls."""
 
 
 def require_held_then_braked(plant: dict[str, np.ndarray], last: int) -> None:
@@ -95,17 +98,24 @@ def test_F16_when_the_simulator_is_killed_expect_the_safe_torque_within_the_watc
     wire = lcm.LCM(experiment.url)
     hearing = wire.subscribe("QLPV_COMMAND", lambda _, data: commands.append(message_types.command_v1.decode(data)))
     hearing.set_queue_capacity(0)
-    controller = experiment.start(experiment.controller_command(*REAL_TIME, "--exit-on-fault"))
-    plant = experiment.start(experiment.simulator_command(*REAL_TIME))
-    while len(commands) < 50 + 7 * run:
-        wire.handle_timeout(100)
-    plant.kill()
+    for _ in range(STALLS):
+        while wire.handle_timeout(20):
+            pass
+        commands.clear()
+        experiment.session += 1
+        controller = experiment.start(experiment.controller_command(*REAL_TIME, "--exit-on-fault"))
+        plant = experiment.start(experiment.simulator_command(*REAL_TIME))
+        while controller.poll() is None and len(commands) < 50 + 7 * run:
+            wire.handle_timeout(100)
+        plant.kill()
+        if len(commands) >= 50 + 7 * run and commands[-1].state != 4:
+            break
     while controller.poll() is None:
         wire.handle_timeout(20)
     code, report, errors = finish(controller)
     assert code == 3
     assert (report["end"], report["state"], report["fault_cause"]) == ("fault", "fault", "plant silent")
-    assert errors.startswith("qlpv-controller: fault stop: plant silent")
+    assert errors.splitlines()[-1].startswith("qlpv-controller: fault stop: plant silent")
     while wire.handle_timeout(50):
         pass
     faulty = [command.state == 4 for command in commands]
