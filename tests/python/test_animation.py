@@ -96,9 +96,11 @@ def test_when_an_animation_is_written_expect_real_time_and_motion_in_every_panel
     assert all(panel.max() > 50 for panel in np.array_split(upper[height // 8 :], 4, axis=1)), width
 
 
-def test_when_a_run_has_no_error_expect_it_drawn() -> None:
+def test_when_a_run_has_no_error_expect_the_moving_arm_drawn() -> None:
     film = Film(pair_of_results("arm3", error_rad=0.0), robot("arm3").model)
-    assert film.draw(0.2).size == film.draw(0.4).size
+    early, late = (np.asarray(film.draw(time_s).convert("L"), dtype=float) for time_s in (0.2, 0.4))
+    height = len(early)
+    assert np.abs(late - early)[height // 8 : 2 * height // 3].max() > 50  # below the title, which tells the time
 
 
 def test_when_an_animation_cannot_be_written_expect_an_input_error(tmp_path: Path) -> None:

@@ -159,15 +159,17 @@ def test_every_line_of_a_console_block_is_run_or_listed_with_a_reason() -> None:
 )
 def test_the_python_of_a_page_runs_and_prints_what_the_page_says(name: str) -> None:
     namespace: dict[str, object] = {"__name__": "page"}
-    printed = ""
+    printed: str | None = None
     for fence in fences(ROOT / name):
         if fence.language == "python":
             output = io.StringIO()
             with contextlib.redirect_stdout(output):
                 exec(compile("\n" * fence.line + fence.text, name, "exec"), namespace)
             printed = output.getvalue()
-        elif fence.language == "text" and printed:
+        elif fence.language == "text" and printed is not None:
             assert fence.text == printed
+        else:
+            printed = None  # a text below another block is not the output of a program
 
 
 def test_no_block_is_in_a_language_that_nothing_checks() -> None:

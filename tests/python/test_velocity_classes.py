@@ -88,7 +88,6 @@ def test_constants_are_tight() -> None:
         "one-sided": classes().one_sided.proved / np.linalg.eigvalsh((J + J.transpose(0, 2, 1)) / 2).max(),
         "entries": max((np.abs(high) / np.maximum(np.abs(J).max(axis=0), 1e-12))[high > 0]),
     }
-    print({name: round(float(ratio), 5) for name, ratio in ratios.items()})
     assert all(1.0 <= ratio < 1.01 for ratio in ratios.values())
     assert classes().bounded.tightness < 1.2
     np.testing.assert_array_equal(low, -high)  # symmetric speeds, no friction
