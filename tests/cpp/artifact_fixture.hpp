@@ -209,6 +209,17 @@ struct TestArm {
     return result;
   }
 
+  /// Weights of the five known signals of `dob-acceleration` and of the joints, both diagonally dominant.
+  static Eigen::MatrixXd weights(int size) {
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Constant(size, size, -0.3);
+    for (int i = 0; i < size; ++i) {
+      matrix(i, i) = 2.0 + 0.5 * i;
+    }
+    return matrix;
+  }
+
+  Json lyapunov_bound() const { return {{"signals", rows(weights(5))}, {"joints", rows(weights(joints))}}; }
+
   Json inertia_table() const {
     return table_of([this](const Eigen::VectorXd& premise) { return inertia_of_premises(premise); });
   }

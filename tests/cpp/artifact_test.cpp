@@ -157,6 +157,41 @@ TEST(Artifact, refuses_a_premultiplication_that_is_null_or_scheduled_otherwise) 
               HasSubstr("a.json: law.premultiplication.blocks[0].vertices[0]"));
 }
 
+TEST(Artifact, keeps_a_lyapunov_bound_of_either_twin_padded_to_the_most_joints) {
+  Json table = artifact_table("dob-acceleration", 2);
+  EXPECT_FALSE(std::get<DobAccelerationParameters>(parse(table).law()).lyapunov_bound);
+  table["law"]["lyapunov_bound"] = testing::TestArm{2}.lyapunov_bound();
+  for (const std::string& bytes : {json_twin(table), cbor_twin(table)}) {
+    const Artifact artifact = Artifact::parse(bytes, "a");
+    const auto& bound = std::get<DobAccelerationParameters>(artifact.law()).lyapunov_bound;
+    ASSERT_TRUE(bound);
+    EXPECT_EQ(bound->signals, testing::TestArm::weights(LyapunovBound::kSignals));
+    EXPECT_EQ(bound->joints.topLeftCorner(2, 2), testing::TestArm::weights(2));
+    EXPECT_TRUE((bound->joints.bottomRows(kMaxJoints - 2).isZero(0.0)));
+    EXPECT_TRUE((bound->joints.rightCols(kMaxJoints - 2).isZero(0.0)));
+  }
+}
+
+TEST(Artifact, refuses_a_lyapunov_bound_that_is_none) {
+  const auto refused_bound = [](const std::string& pointer, const Json& value) {
+    Json bound = testing::TestArm{3}.lyapunov_bound();
+    bound[Json::json_pointer(pointer)] = value;
+    return refused("/law/lyapunov_bound", bound);
+  };
+  EXPECT_THAT(refused("/law/lyapunov_bound", nullptr), HasSubstr("a.json: law.lyapunov_bound: got null, expected"));
+  EXPECT_THAT(refused_bound("/surprise", 1), HasSubstr("a.json: law.lyapunov_bound: got the unknown member"));
+  EXPECT_THAT(refused_bound("/signals/0/1", 9.0), HasSubstr("law.lyapunov_bound.signals: got a matrix with asymmetry"));
+  EXPECT_THAT(refused_bound("/signals/4/4", -1.0), HasSubstr("law.lyapunov_bound.signals: got smallest eigenvalue -"));
+  EXPECT_THAT(refused_bound("/signals/4", {1.0}), HasSubstr("law.lyapunov_bound.signals[4]: got an array of 1"));
+  EXPECT_THAT(refused_bound("/signals/2/2", nullptr), HasSubstr("law.lyapunov_bound.signals[2][2]: got null"));
+  EXPECT_THAT(refused_bound("/joints", Json::array({{1.0}})), HasSubstr("law.lyapunov_bound.joints: got 1 rows"));
+  EXPECT_THAT(refused_bound("/joints/0/1", 0.2), HasSubstr("law.lyapunov_bound.joints: got a matrix with asymmetry"));
+  Json table = artifact_table("dob-acceleration", 3);
+  table["law"]["lyapunov_bound"] = testing::TestArm{3}.lyapunov_bound();
+  table["law"]["observer"][0] = 1.0;  // the correction leaves nothing of the innovation to read it off
+  EXPECT_THAT(refusal([&] { parse(table); }), HasSubstr("a.json: law.observer[0]: got 1, expected another number"));
+}
+
 TEST(Artifact, refuses_a_lyapunov_matrix_of_another_shape_or_that_is_not_symmetric_and_positive_definite) {
   EXPECT_THAT(refused("/law/lyapunov/8", {1.0, 2.0, 3.0}, "hinf-tracking"),
               HasSubstr("a.json: law.lyapunov[8]: got an array of 3"));

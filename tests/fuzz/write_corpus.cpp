@@ -38,11 +38,16 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder = argv[1];
+  const auto write_twins = [&folder](const std::string& name, const Json& artifact) {
+    write(folder / "artifact_json" / name, json_twin(artifact));
+    write(folder / "artifact_cbor" / name, cbor_twin(artifact));
+  };
   for (const char* kind : kLawKinds) {
-    const Json artifact = artifact_table(kind, 1);
-    write(folder / "artifact_json" / kind, json_twin(artifact));
-    write(folder / "artifact_cbor" / kind, cbor_twin(artifact));
+    write_twins(kind, artifact_table(kind, 1));
   }
+  Json watched = artifact_table("dob-acceleration", 1);
+  watched["law"]["lyapunov_bound"] = TestArm{1}.lyapunov_bound();
+  write_twins("lyapunov-bound", watched);
   write(folder / "message" / "measurement", message_seed<measurement_v1>(0));
   write(folder / "message" / "command", message_seed<command_v1>(1));
   write(folder / "message" / "event", message_seed<event_v1>(2));

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 from typing import Any
 
 import numpy as np
 import pytest
 
 from quasilpv.artifact import Artifact, evaluate
+from quasilpv.artifact.canonical import canonical_cbor, parse_document
 from quasilpv.artifact.tables import PolytopeTable
 from quasilpv.errors import InputError
 from quasilpv.systems.registry import robot
@@ -88,6 +90,43 @@ def test_when_a_premultiplication_breaks_a_rule_expect_it_named(change: Change, 
     error = refusal(premultiplied(), change)
     assert error.field.startswith("law.premultiplication")
     assert message in str(error)
+
+
+def watched() -> dict[str, Any]:
+    document = arm3_document("dob-acceleration")
+    document["law"]["lyapunov_bound"] = {"signals": np.diag([1, 2, 3, 4, 5.5]).tolist(), "joints": np.eye(3).tolist()}
+    return document
+
+
+def test_when_a_law_has_a_lyapunov_bound_or_none_expect_the_member_kept_or_absent_in_either_twin() -> None:
+    document, without_it = watched(), arm3_document("dob-acceleration")
+    artifact = Artifact.from_document(document)
+    assert artifact.to_document()["law"]["lyapunov_bound"] == document["law"]["lyapunov_bound"]
+    assert parse_document(canonical_cbor(artifact.to_document()), "cbor") == artifact.to_document()
+    assert "lyapunov_bound" not in Artifact.from_document(without_it).to_document()["law"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (at("law", "lyapunov_bound", value=None), "lyapunov_bound: got null, expected two matrices"),
+        (at("law", "lyapunov_bound", "surprise", value=1), "surprise"),
+        (at("law", "lyapunov_bound", "joints", value=np.eye(2).tolist()), "joints: got 2 x 2, expected 3 x 3"),
+        (
+            at("law", "lyapunov_bound", "signals", 0, 1, value=9.0),
+            "signals[0][1]: got 9.0, expected 0.0, the symmetric",
+        ),
+        (at("law", "lyapunov_bound", "signals", 3, 3, value=-1.0), "signals: got smallest eigenvalue -1"),
+        (at("law", "lyapunov_bound", "signals", 3, 3, value=math.nan), "finite"),
+        (at("law", "lyapunov_bound", "joints", value=[[1.0]]), "joints: got 1 x 1, expected 3 x 3"),
+        (
+            at("law", "observer", 0, value=1.0),
+            "law.observer[0]: got 1, expected another number with law.lyapunov_bound",
+        ),
+    ],
+)
+def test_when_a_lyapunov_bound_breaks_a_rule_expect_it_named(change: Change, message: str) -> None:
+    assert message in str(refusal(watched(), change))
 
 
 @pytest.mark.parametrize(

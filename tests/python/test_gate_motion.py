@@ -1,13 +1,11 @@
-"""One Lyapunov function for all motions: the disc of inertias, the circle criterion, the function, wrong claims."""
+"""One Lyapunov function for all motions exists: the disc of inertias, the circle criterion, wrong claims."""
 
 from __future__ import annotations
 
 import copy
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
-import cvxpy as cp
 import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat
@@ -26,27 +24,10 @@ from quasilpv.errors import InputError
 from quasilpv.release import to_artifact
 from quasilpv.synthesis import Specification, synthesise
 from quasilpv.synthesis.moving_inertia import needed_disc
-from quasilpv.systems.registry import Robot, robot
-from reference.gated_arms import artifact_document, full_map, multiple_pole_loop
+from quasilpv.systems.registry import robot
+from reference.gated_arms import artifact_document, full_map, moving_five_bar, multiple_pole_loop, quotients
 
 LOOP = multiple_pole_loop(60, 1200, 1e-3, 1e-3)
-
-
-@cache
-def moving_five_bar() -> dict[str, Any]:
-    """The five-bar's design with a motion claim, at 2 kHz."""
-    return to_artifact(synthesise(robot("fivebar"), "dob-moving", Specification(rate_hz=2000.0))).content()
-
-
-def quotients(subject: Robot, scale: float, count: int, seed: int) -> np.ndarray:
-    """``M_t^-1 M_n`` at random postures and payloads of the operating domain."""
-    rng = np.random.default_rng(seed)
-    low, high = np.array(subject.domain.angle_rad).T
-    found = []
-    for theta, fraction in zip(rng.uniform(low, high, (count, len(low))), rng.uniform(0, 1, count), strict=True):
-        true = subject.with_payload_fraction(float(fraction)).inertia(theta)
-        found.append(np.linalg.solve(true, scale * subject.model.inertia(theta)))
-    return np.array(found)
 
 
 # ---- products of cosines ---------------------------------------------------------------------------------------------
@@ -128,49 +109,6 @@ def test_when_the_radius_is_at_its_limit_expect_the_criterion_to_tell_just_insid
 def test_when_the_delay_is_more_than_a_sample_expect_one_line() -> None:
     with pytest.raises(InputError, match="a delay between 0 and 1 sample"):
         satisfies_circle_criterion(LOOP, fmpq(1), fmpq(1, 2), fmpq(3, 2))
-
-
-# ---- the Lyapunov function itself ------------------------------------------------------------------------------------
-
-
-def moving_map(loop: Any, X: np.ndarray, delay: float) -> np.ndarray:
-    """Per-sample map whose last signal is what the command on its way will do, ``X a``, not the command a."""
-    n = len(X)
-    units = np.eye(9 * n)
-    units[-n:, -n:] = X
-    return np.asarray(units @ full_map(loop, X, delay) @ np.linalg.inv(units))
-
-
-def lyapunov_matrix(loop: Any, centre: float, radius: float, delay: float) -> np.ndarray:
-    """P of the bounded real lemma for one joint, found with another solver front end than the design uses."""
-    base = moving_map(loop, np.array([[centre]]), delay)
-    step = moving_map(loop, np.array([[centre + 1.0]]), delay) - base
-    u, s, vt = np.linalg.svd(step)
-    assert s[1] < 1e-9 * s[0]  # of rank one: b k'
-    b, k = u[:, :1] * s[0], vt[:1]
-    scale = np.diag(loop.sample_period_s ** np.array([0, 1, 0, 1, 2, 3, 2, -1, 2.0]))
-    A, b, k = scale @ base @ np.linalg.inv(scale), scale @ b, k @ np.linalg.inv(scale)
-    P, t = cp.Variable((9, 9), symmetric=True), cp.Variable()
-    block = cp.bmat([[P - A.T @ P @ A - t * k.T @ k, -A.T @ P @ b], [-b.T @ P @ A, t / radius**2 - b.T @ P @ b]])
-    problem = cp.Problem(cp.Minimize(cp.trace(P)), [P >> np.eye(9), block >> 1e-9 * np.eye(10)])
-    problem.solve(solver="CLARABEL")
-    return np.asarray(scale @ P.value @ scale)
-
-
-@pytest.mark.parametrize("delay", [0.0, 0.5])
-def test_when_postures_and_payloads_change_at_every_sample_expect_one_function_to_decrease(delay: float) -> None:
-    document = moving_five_bar()
-    motion, loop = document["witness"]["motion"], loop_data(document)
-    assert delay <= motion["longest_delay_samples"]
-    scale = document["verification"]["report"]["inertia_scale"]
-    P = lyapunov_matrix(loop, motion["centre"], motion["radius"], delay)
-    V = np.kron(P, np.linalg.inv(np.array(motion["shape"])))
-    rng = np.random.default_rng(3)
-    for X in quotients(robot("fivebar"), scale, 60, 4):
-        A = moving_map(loop, X, delay)
-        states = rng.normal(size=(200, 18)) / np.sqrt(V.diagonal())
-        after = states @ A.T
-        assert np.all(np.einsum("ni,ij,nj->n", after, V, after) < np.einsum("ni,ij,nj->n", states, V, states))
 
 
 # ---- the claim in an artifact ----------------------------------------------------------------------------------------

@@ -96,9 +96,30 @@ DesignModel parse_model(const Field& law, const Field& programs, int joints) {
   return {std::move(premises), std::move(inertia), std::move(gravity)};
 }
 
+Eigen::MatrixXd parse_lyapunov(const Field& field, int size) {
+  Eigen::MatrixXd lyapunov = parse_matrix(field, size, size);
+  require_symmetric(field, "a matrix", lyapunov, "a symmetric matrix");
+  require_positive_definite(field, "", lyapunov, "a positive definite matrix");
+  return lyapunov;
+}
+
+// The innovation is read off the corrected estimate, y - th = (1 - l1) (y - predicted angle).
+LyapunovBound parse_lyapunov_bound(const Field& law, int joints) {
+  const Field bound = law["lyapunov_bound"];
+  bound.only({"signals", "joints"});
+  if (law["observer"].at(0).number() == 1.0) {
+    law["observer"].at(0).fail("1", "another number with law.lyapunov_bound");
+  }
+  LyapunovBound parsed{parse_lyapunov(bound["signals"], LyapunovBound::kSignals),
+                       Eigen::Matrix<double, kMaxJoints, kMaxJoints>::Zero()};
+  parsed.joints.topLeftCorner(joints, joints) = parse_lyapunov(bound["joints"], joints);
+  return parsed;
+}
+
 DobAccelerationParameters parse_dob_acceleration(const Field& law, const Field& programs, int joints) {
   programs.only({"premises", "gravity"});
-  law.only({"kind", "feedback", "observer", "filter_time_constant_s", "disturbance_compensation", "inertia"});
+  law.only({"kind", "feedback", "observer", "filter_time_constant_s", "disturbance_compensation", "inertia",
+            "lyapunov_bound"});
   const Field feedback = law["feedback"];
   feedback.only({"kp", "kd", "ki"});
   DobAccelerationParameters parameters{parse_model(law, programs, joints)};
@@ -109,6 +130,9 @@ DobAccelerationParameters parse_dob_acceleration(const Field& law, const Field& 
   std::copy(observer.begin(), observer.end(), parameters.observer.begin());
   parameters.filter_time_constant_s = law["filter_time_constant_s"].positive();
   parameters.disturbance_compensation = law["disturbance_compensation"].boolean();
+  if (law.has("lyapunov_bound")) {
+    parameters.lyapunov_bound = parse_lyapunov_bound(law, joints);
+  }
   return parameters;
 }
 
@@ -132,13 +156,6 @@ DobTorqueParameters parse_dob_torque(const Field& law, const Field& programs, in
   }
   return {std::move(model), std::move(feedback), std::move(observer), law["filter_time_constant_s"].positive(),
           std::move(premultiplication)};
-}
-
-Eigen::MatrixXd parse_lyapunov(const Field& field, int size) {
-  Eigen::MatrixXd lyapunov = parse_matrix(field, size, size);
-  require_symmetric(field, "a matrix", lyapunov, "a symmetric matrix");
-  require_positive_definite(field, "", lyapunov, "a positive definite matrix");
-  return lyapunov;
 }
 
 HinfTrackingParameters parse_hinf_tracking(const Field& law, const Field& programs, int joints) {

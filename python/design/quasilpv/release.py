@@ -102,6 +102,8 @@ def checked_artifact(design: TrackingDesign, allow_unverified: bool = False) -> 
 
 def _why_not_passed(found: Mapping[str, Any]) -> str:
     """Half a line: what the gate wanted and what it found."""
+    if found.get("proved_in_motion") is False:
+        return "robust gate: one Lyapunov function for all motions is claimed, but not proved"
     rate, needed, margin = (found[name] for name in ("worst_growth_rate_per_s", "needed_range", "inertia_margin"))
     if needed and margin and "grid" not in found:
         (a, b), (low, high) = needed, margin

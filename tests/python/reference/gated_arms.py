@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,11 @@ import numpy.typing as npt
 from quasilpv.certificate.gate_data import loop_data
 from quasilpv.certificate.gate_loop import AccelerationLoopData
 from quasilpv.release import to_artifact
+from quasilpv.synthesis import Specification, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
 from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.registry import Robot
+from quasilpv.systems.registry import Robot, robot
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -81,6 +83,29 @@ def artifact_document(robot: Robot, loop: AccelerationLoopData, inertia_scale: f
     document = to_artifact(design).content()
     assert loop_data(document) == loop
     return document
+
+
+@cache
+def moving_design() -> TrackingDesign:
+    """The five-bar's design with a motion claim, at 2 kHz."""
+    return synthesise(robot("fivebar"), "dob-moving", Specification(rate_hz=2000.0))
+
+
+@cache
+def moving_five_bar() -> dict[str, Any]:
+    """Its artifact, unchecked."""
+    return to_artifact(moving_design()).content()
+
+
+def quotients(subject: Robot, scale: float, count: int, seed: int) -> FloatArray:
+    """``M_t^-1 M_n`` at random postures and payloads of the operating domain."""
+    rng = np.random.default_rng(seed)
+    low, high = np.array(subject.domain.angle_rad).T
+    found = []
+    for theta, fraction in zip(rng.uniform(low, high, (count, len(low))), rng.uniform(0, 1, count), strict=True):
+        true = subject.with_payload_fraction(float(fraction)).inertia(theta)
+        found.append(np.linalg.solve(true, scale * subject.model.inertia(theta)))
+    return np.array(found)
 
 
 def arm4() -> Robot:

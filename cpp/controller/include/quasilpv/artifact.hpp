@@ -23,16 +23,26 @@ struct DesignModel {
   Program gravity;
 };
 
+/// A proved lower bound of the Lyapunov function of a moving robot (docs/concepts/motion.md), rad^2: the trace of
+/// `joints` Z' `signals` Z. The rows of Z, one column per joint, are what is known of the loop, all in rad: the angle
+/// error y - r, the innovation, T (w - r'), T^2 (d - d_f) and e_I / T.
+struct LyapunovBound {
+  static constexpr int kSignals = 5;
+  Eigen::Matrix<double, kSignals, kSignals> signals;     ///< symmetric positive definite
+  Eigen::Matrix<double, kMaxJoints, kMaxJoints> joints;  ///< the same; zero from the number of joints on
+};
+
 /// Kind `dob-acceleration`: scalars of the sampled law, the same for every joint. Errors are x - x_r: stabilising kp,
 /// kd and ki are negative.
 struct DobAccelerationParameters {
   DesignModel model;
-  double kp = 0.0;                       ///< 1/s^2
-  double kd = 0.0;                       ///< 1/s
-  double ki = 0.0;                       ///< 1/s^3
-  std::array<double, 4> observer{};      ///< l1 (1), l2 (1/s), l3 (1/s^2), l4 (1/s^3)
-  double filter_time_constant_s = 0.0;   ///< of the disturbance filter, > 0
-  bool disturbance_compensation = true;  ///< false: observed and predicted, but not subtracted
+  double kp = 0.0;                                             ///< 1/s^2
+  double kd = 0.0;                                             ///< 1/s
+  double ki = 0.0;                                             ///< 1/s^3
+  std::array<double, 4> observer{};                            ///< l1 (1), l2 (1/s), l3 (1/s^2), l4 (1/s^3)
+  double filter_time_constant_s = 0.0;                         ///< of the disturbance filter, > 0
+  bool disturbance_compensation = true;                        ///< false: observed and predicted, but not subtracted
+  std::optional<LyapunovBound> lyapunov_bound = std::nullopt;  ///< none: not designed for one
 };
 
 /// Kind `dob-torque`: gains scheduled on the premises of the inertia. Errors are x - x_r. With a premultiplication beta

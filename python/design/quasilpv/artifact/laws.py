@@ -15,6 +15,9 @@ NonNegative = Annotated[float, Field(ge=0)]
 MIN_WINDOW_SAMPLES = 5
 """A shorter moving window has no mean to speak of; 0 stands for its limit."""
 
+KNOWN_SIGNALS = 5
+"""Of one joint: what of the loop is known at run time."""
+
 MAX_WINDOW_SAMPLES = 4096
 MAX_DELAYED_VERTICES = 16
 
@@ -58,43 +61,72 @@ class _ScheduledLaw(_VelocityLaw):
         return table.premises if program == "schedule" else super().premises_of(program)
 
 
-class DobAccelerationLaw(_Law):
-    """Tracking at the acceleration level with a disturbance observer, the same scalars for every joint.
+class _OptionalMemberLaw(_Law):
+    """A law with a member that may be absent, but is not null: a document without it has no such member."""
 
-    With ``disturbance_compensation`` false the observer runs but its filtered disturbance is not fed back.
-    """
-
-    kind: Literal["dob-acceleration"]
-    feedback: Feedback
-    observer: tuple[float, float, float, float]
-    filter_time_constant_s: Positive
-    disturbance_compensation: bool
-
-
-class DobTorqueLaw(_Law):
-    """Tracking in torque coordinates with a disturbance observer and scheduled gains (Dehak 2022, Theorem IV.11).
-
-    ``feedback`` holds [Kp Kd KI], n x 3n, acting on x - x_r; ``observer`` holds [L1; L2; L3; L4], 4n x n. With
-    ``premultiplication`` beta, n x n, they belong to beta(z) times the equations of motion; a document without it has
-    no such member.
-    """
-
-    kind: Literal["dob-torque"]
-    feedback: PolytopeTable
-    observer: PolytopeTable
-    filter_time_constant_s: Positive
-    premultiplication: PolytopeTable | None = None
+    optional: ClassVar[tuple[str, str]]
+    """The member and what it is, for messages."""
 
     @model_validator(mode="after")
     def _refuse_null(self) -> Self:
-        if self.premultiplication is None and "premultiplication" in self.model_fields_set:
-            raise FieldError("premultiplication", "null", "a block polytope, or no member of this name")
+        name, meaning = self.optional
+        if getattr(self, name) is None and name in self.model_fields_set:
+            raise FieldError(name, "null", f"{meaning}, or no member of this name")
         return self
 
     @model_serializer(mode="wrap")
     def _leave_out_absent(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
         members: dict[str, Any] = serialise(self)
         return {name: member for name, member in members.items() if member is not None}
+
+
+class LyapunovBound(StrictModel):
+    """A proved lower bound of a Lyapunov function, ``tr(joints Z' signals Z)`` with Z the known signals, 5 x n."""
+
+    signals: Matrix
+    joints: Matrix
+
+
+class DobAccelerationLaw(_OptionalMemberLaw):
+    """Tracking at the acceleration level with a disturbance observer, the same scalars for every joint.
+
+    With ``disturbance_compensation`` false the observer runs but its filtered disturbance is not fed back.
+    ``lyapunov_bound`` is for the monitor (``docs/concepts/motion.md``).
+    """
+
+    optional: ClassVar[tuple[str, str]] = ("lyapunov_bound", "two matrices")
+
+    kind: Literal["dob-acceleration"]
+    feedback: Feedback
+    observer: tuple[float, float, float, float]
+    filter_time_constant_s: Positive
+    disturbance_compensation: bool
+    lyapunov_bound: LyapunovBound | None = None
+
+    def check(self, joints: int) -> None:
+        """See `_Law.check`."""
+        if self.lyapunov_bound is None:
+            return
+        require_lyapunov("law.lyapunov_bound.signals", self.lyapunov_bound.signals, KNOWN_SIGNALS)
+        require_lyapunov("law.lyapunov_bound.joints", self.lyapunov_bound.joints, joints)
+        if self.observer[0] == 1.0:
+            raise FieldError("law.observer[0]", 1, "another number with law.lyapunov_bound")
+
+
+class DobTorqueLaw(_OptionalMemberLaw):
+    """Tracking in torque coordinates with a disturbance observer and scheduled gains (Dehak 2022, Theorem IV.11).
+
+    ``feedback`` holds [Kp Kd KI], n x 3n, acting on x - x_r; ``observer`` holds [L1; L2; L3; L4], 4n x n. With
+    ``premultiplication`` beta, n x n, they belong to beta(z) times the equations of motion.
+    """
+
+    optional: ClassVar[tuple[str, str]] = ("premultiplication", "a block polytope")
+
+    kind: Literal["dob-torque"]
+    feedback: PolytopeTable
+    observer: PolytopeTable
+    filter_time_constant_s: Positive
+    premultiplication: PolytopeTable | None = None
 
     def check(self, joints: int) -> None:
         """See `_Law.check`."""

@@ -20,6 +20,7 @@ from flint import fmpq, fmpq_poly
 from quasilpv.certificate.gate_data import HALF_A_SAMPLE, inertia_data, loop_data
 from quasilpv.certificate.gate_delay import DelayMargin, delay_margin
 from quasilpv.certificate.gate_loop import AccelerationLoopData, CharacteristicPolynomial, Controller
+from quasilpv.certificate.gate_lyapunov import is_function_proved
 from quasilpv.certificate.gate_margin import InertiaMargin, inertia_margin
 from quasilpv.certificate.gate_motion import is_proved_in_motion
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, Place, needed_range
@@ -51,8 +52,8 @@ class RobustGate:
         needed: which ratios occur; None if no bounds could be proved.
         delays: up to which delay the needed range is inside; None without a needed range.
         worst: numerical worst case over the needed range; None without one.
-        motion: whether one Lyapunov function is proved common to all motions (`gate_motion`); None if the artifact does
-            not claim it.
+        motion: whether one Lyapunov function is proved common to all motions (`gate_motion`), and the one that is
+            shipped is one (`gate_lyapunov`); None if the artifact does not claim it.
     """
 
     loop: AccelerationLoopData
@@ -129,9 +130,18 @@ def robust_gate(
         return RobustGate(loop, delay_samples, margin, None, None, None)
     delays = delay_margin(loop, needed.lowest, needed.highest)
     worst = worst_case(loop, inertia, needed, (fmpq(0), delay_samples))
-    claimed = (document["witness"] or {}).get("motion")
-    motion = None if claimed is None else is_proved_in_motion(claimed, loop, inertia, source)
+    motion = _proved_in_motion(document, loop, inertia, source)
     return RobustGate(loop, delay_samples, margin, needed, delays, worst, motion)
+
+
+def _proved_in_motion(
+    document: Mapping[str, Any], loop: AccelerationLoopData, inertia: InertiaPair, source: str
+) -> bool | None:
+    """Whether all that an artifact claims of motions is proved; None if it claims nothing."""
+    claimed = (document["witness"] or {}).get("motion")
+    if claimed is None:
+        return None if is_function_proved(document, loop, source) else False
+    return is_proved_in_motion(claimed, loop, inertia, source) and is_function_proved(document, loop, source)
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,10 +79,7 @@ class InertiaDisc:
         centre, radius = rational(member["centre"]), rational(member["radius"])
         if not 0 <= radius < centre:
             raise InputError(source, "witness.motion.radius", member["radius"], "at least 0 and less than the centre")
-        shape = matrix(member["shape"])
-        if (shape.nrows(), shape.ncols()) != (joints, joints) or not is_symmetric(shape):
-            raise InputError(source, "witness.motion.shape", "another matrix", f"symmetric, {joints} x {joints}")
-        return cls(centre, radius, shape)
+        return cls(centre, radius, symmetric_matrix(member["shape"], joints, "witness.motion.shape", source))
 
     def inequality(self, inertia: InertiaPair) -> CosineMatrix:
         """The left side of (disc) without inverse, in absolute angles."""
@@ -102,6 +99,18 @@ class InertiaDisc:
             return np.asarray(np.linalg.eigvalsh(inequality.at(points))[:, 0] < 0.0)
 
         return isinstance(prove_positive(inequality.to_pencil(), inertia.domain(), refutes), int)
+
+
+def symmetric_matrix(rows: Sequence[Sequence[Any]], size: int, field: str, source: str) -> fmpq_mat:
+    """A member of an artifact as an exact matrix.
+
+    Raises:
+        InputError: it is not symmetric, or of another size.
+    """
+    square = matrix(rows)
+    if (square.nrows(), square.ncols()) != (size, size) or not is_symmetric(square):
+        raise InputError(source, field, "another matrix", f"symmetric, {size} x {size}")
+    return square
 
 
 def is_proved_in_motion(

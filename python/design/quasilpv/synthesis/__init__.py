@@ -134,6 +134,7 @@ def synthesise(
     if "disturbance_compensation" not in design.law:
         raise InputError(controller, "disturbance_compensation", "off", "dob-acceleration, the law that has it")
     without = {"disturbance_compensation": False}
-    # The envelope is that of the compensated loop.
-    witness = {name: member for name, member in (design.witness or {}).items() if name != "envelope"}
-    return replace(design, law={**design.law, **without}, inputs={**design.inputs, **without}, witness=witness or None)
+    # The envelope and the Lyapunov function are those of the compensated loop.
+    law = {name: member for name, member in design.law.items() if name != "lyapunov_bound"}
+    witness = {name: member for name, member in (design.witness or {}).items() if name not in ("envelope", "motion")}
+    return replace(design, law={**law, **without}, inputs={**design.inputs, **without}, witness=witness or None)

@@ -11,6 +11,7 @@ from typing import Any
 
 from quasilpv.conditions.sampled_chains import ChainGains
 from quasilpv.synthesis.acceleration_design import AccelerationDesign, Progress, design_acceleration_law, no_progress
+from quasilpv.synthesis.moving_lyapunov import MovingLyapunov, moving_lyapunov
 from quasilpv.synthesis.operating_envelope import acceleration_envelope
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
@@ -53,7 +54,7 @@ def acceleration_law_of(robot: Robot, specification: Specification, design: Acce
         robot, specification: what it was made for.
         design: scalars and evidence.
     """
-    scalars = design.candidate.law
+    scalars, lyapunov = design.candidate.law, _lyapunov(design, specification)
     controller = "dob-acceleration" if design.disc is None else "dob-moving"
     kp, kd, ki = (float(gain) for gain in scalars.feedback)
     return TrackingDesign(
@@ -67,20 +68,32 @@ def acceleration_law_of(robot: Robot, specification: Specification, design: Acce
             "filter_time_constant_s": scalars.filter_time_constant_s,
             "disturbance_compensation": True,
             "inertia": inertia_table(robot, design.candidate.inertia_scale),
+            **({} if lyapunov is None else {"lyapunov_bound": lyapunov.bound_document()}),
         },
         expressions=premise_and_gravity(robot),
         inputs={"controller": controller, "specification": specification.to_document()},
         report=design.report(),
-        witness=_witness(design, specification),
+        witness=_witness(design, specification, lyapunov),
     )
 
 
-def _witness(design: AccelerationDesign, specification: Specification) -> dict[str, Any]:
+def _lyapunov(design: AccelerationDesign, specification: Specification) -> MovingLyapunov | None:
+    """A common Lyapunov function for the disc of the design, if it has one and a function is found."""
+    if design.disc is None:
+        return None
+    return moving_lyapunov(design.candidate.law, design.disc, specification.delay_samples)
+
+
+def _witness(
+    design: AccelerationDesign, specification: Specification, lyapunov: MovingLyapunov | None
+) -> dict[str, Any]:
     """The points of the two conditions, in their own time unit, and the bandwidths that fix their data."""
     wc, wo = design.candidate.bandwidths
     motion = {}
     if design.disc is not None:
-        motion = {"motion": {**design.disc.to_document(), "longest_delay_samples": specification.delay_samples}}
+        function = {} if lyapunov is None else {"lyapunov": lyapunov.to_document()}
+        longest = {"longest_delay_samples": specification.delay_samples}
+        motion = {"motion": {**design.disc.to_document(), **longest, **function}}
     return {
         "feedback": {"condition": "sampled-feedback", "bandwidth_rad_s": wc, **_point(design.feedback, "P")},
         "observer": {"condition": "sampled-observer", "bandwidth_rad_s": wo, **_point(design.observer, "Q")},
