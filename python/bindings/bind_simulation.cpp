@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "bindings.hpp"
-#include "quasilpv/controller.hpp"
 #include "quasilpv/errors.hpp"
 #include "quasilpv/scenario.hpp"
 #include "quasilpv/serial_arm.hpp"
@@ -99,8 +98,7 @@ py::dict run(const Artifact& artifact, const Trajectory& trajectory, const Scena
   RunRecord record;
   {
     const py::gil_scoped_release release;
-    Controller controller(artifact);
-    record = run_closed_loop(scenario, controller, trajectory);
+    record = run_closed_loop(scenario, artifact, trajectory);
   }
   py::dict columns;
   for (const Record::Column& column : record.samples.columns()) {

@@ -36,8 +36,13 @@ inline Trajectory trajectory() {
   return Trajectory::parse(json_twin(table), "test");
 }
 
+/// With a Lyapunov bound for the monitor, where the kind has one.
 inline Artifact artifact(const std::string& kind = "dob-acceleration") {
-  return Artifact::parse(json_twin(artifact_table(kind, kJoints)), "test");
+  Json table = artifact_table(kind, kJoints);
+  if (kind == "dob-acceleration") {
+    table["law"]["lyapunov_bound"] = TestArm{kJoints}.lyapunov_bound();
+  }
+  return Artifact::parse(json_twin(table), "test");
 }
 
 /// Every imperfection on: a difference in the order of calls or in the number of noise samples shows.

@@ -63,8 +63,8 @@ def tracked(
 
 COMPARED = (
     ("measurement", ()),
-    ("command", ("state",)),  # a run in one process has no fail-safe and no monitor
-    ("telemetry", ("state", "step_ns", "membership_sum", "premise_excess")),
+    ("command", ("state",)),  # a run in one process has no fail-safe
+    ("telemetry", ("state", "step_ns")),
     ("truth", ()),
 )
 """Channels of a log, and what on them differs between a run over the wire and one in this process."""

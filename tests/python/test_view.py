@@ -153,6 +153,8 @@ def test_when_curves_are_cut_at_a_sample_expect_what_was_until_then(playback: Pl
     low, high = torque.range
     assert low < torque.values.min() <= torque.values.max() < high
     assert disturbance.dashed == [False] * 3 + [True] * 3
+    watched = replace(playback.motion, lyapunov_rad2=np.square(playback.motion.time_s))
+    assert [len(curves.labels) for curves in curves_of(playback.with_motion(watched))] == [3, 3, 6, 3, 1]
     unknown = playback.with_motion(replace(playback.motion, disturbance=np.full_like(playback.motion.estimate, np.nan)))
     assert len(curves_of(unknown)[2].labels) == 3
 

@@ -164,10 +164,10 @@ void ControlLoop::write_telemetry(const StepInput& input, const StepReport& repo
   copy(report.torque_commanded, telemetry_.commanded_torque_nm);
   copy(last_torque_, telemetry_.applied_torque_nm);
   std::copy(report.premise.begin(), report.premise.end(), telemetry_.premise);
-  const bool measured = (report.flags & kMeasurementInvalid) == 0;
-  const MonitorReport seen = monitor_.observe(measured ? input.angle : report.estimated_angle);
+  const MonitorReport seen = monitor_.observe(input, report);
   telemetry_.membership_sum = seen.membership_sum;
   telemetry_.premise_excess = seen.premise_excess;
+  telemetry_.lyapunov_rad2 = seen.lyapunov;
   post_mortem_.add(telemetry_);
   if (ring_ != nullptr) {
     telemetry_.drops = ring_->drops();

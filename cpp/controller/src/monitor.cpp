@@ -5,16 +5,41 @@
 namespace quasilpv {
 
 Monitor::Monitor(const Artifact& artifact)
-    : model_(std::visit([](const auto& law) { return law.model; }, artifact.law())) {}
+    : model_(std::visit([](const auto& law) { return law.model; }, artifact.law())),
+      sample_period_s_(artifact.sample_period_s()) {
+  if (const auto* law = std::get_if<DobAccelerationParameters>(&artifact.law())) {
+    bound_ = law->lyapunov_bound;
+    innovation_share_ = 1.0 - law->observer[0];
+  }
+}
 
-MonitorReport Monitor::observe(const JointArray& angle) const noexcept {
+MonitorReport Monitor::observe(const StepInput& input, const StepReport& report) const noexcept {
+  const bool measured = (report.flags & kMeasurementInvalid) == 0;
+  const JointArray& angle = measured ? input.angle : report.estimated_angle;
   std::array<double, kMaxPremises> premise{};
   model_.premises.evaluate(ProgramInput{angle.data()}, premise.data());
-  MonitorReport report;
-  report.premise_excess = model_.inertia.excess(premise.data());
+  MonitorReport seen;
+  seen.premise_excess = model_.inertia.excess(premise.data());
   model_.inertia.clamp(premise.data());
-  report.membership_sum = model_.inertia.weight_sum(premise.data());
-  return report;
+  seen.membership_sum = model_.inertia.weight_sum(premise.data());
+  if (bound_ && (report.flags & (kMeasurementInvalid | kReferenceInvalid)) == 0) {
+    seen.lyapunov = lyapunov(input, report);
+  }
+  return seen;
+}
+
+double Monitor::lyapunov(const StepInput& input, const StepReport& report) const noexcept {
+  const double T = sample_period_s_;
+  Eigen::Matrix<double, LyapunovBound::kSignals, kMaxJoints> signals;
+  for (int joint = 0; joint < kMaxJoints; ++joint) {
+    const auto j = static_cast<std::size_t>(joint);
+    signals.col(joint) << input.angle[j] - input.reference.angle[j],
+        (input.angle[j] - report.estimated_angle[j]) / innovation_share_,
+        T * (report.estimated_speed[j] - input.reference.speed[j]),
+        T * T * (report.estimated_disturbance[j] - report.filtered_disturbance[j]), report.integral_error[j] / T;
+  }
+  const Eigen::Matrix<double, kMaxJoints, kMaxJoints> energy = signals.transpose() * bound_->signals * signals;
+  return energy.cwiseProduct(bound_->joints).sum();
 }
 
 }  // namespace quasilpv

@@ -50,4 +50,16 @@ void StepColumns::append(const StepInput& input, const StepReport& report) {
   record_.append(flags_, static_cast<double>(report.flags));
 }
 
+MonitorColumns::MonitorColumns(Record& record) : record_(record) {
+  membership_sum_ = record.add_column("membership_sum");
+  premise_excess_ = record.add_column("premise_excess");
+  lyapunov_ = record.add_column("lyapunov_rad2");
+}
+
+void MonitorColumns::append(const MonitorReport& seen) {
+  record_.append(membership_sum_, seen.membership_sum);
+  record_.append(premise_excess_, seen.premise_excess);
+  record_.append(lyapunov_, seen.lyapunov);
+}
+
 }  // namespace quasilpv

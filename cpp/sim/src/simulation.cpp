@@ -1,12 +1,29 @@
 #include "quasilpv/simulation.hpp"
 
 #include <string>
+#include <vector>
 
 #include "quasilpv/errors.hpp"
 #include "quasilpv/plant_session.hpp"
 #include "quasilpv/run_columns.hpp"
 
 namespace quasilpv {
+namespace {
+
+void require_joints(const Scenario& scenario, const std::string& source, int joints) {
+  if (joints != scenario.joints()) {
+    throw InputError(source, "joints", std::to_string(joints),
+                     std::to_string(scenario.joints()) + " as in scenario '" + scenario.name + "'");
+  }
+}
+
+RunRecord follow(const Scenario& scenario, double sample_period_s, const Trajectory& trajectory,
+                 const StepFunction& step) {
+  require_joints(scenario, "trajectory '" + trajectory.name() + "'", trajectory.joints());
+  return run_closed_loop(scenario, sample_period_s, step, [&](double time_s) { return trajectory.evaluate(time_s); });
+}
+
+}  // namespace
 
 RunRecord run_closed_loop(const Scenario& scenario, double sample_period_s, const StepFunction& step,
                           const ReferenceFunction& reference) {
@@ -39,18 +56,27 @@ RunRecord run_closed_loop(const Scenario& scenario, double sample_period_s, cons
 }
 
 RunRecord run_closed_loop(const Scenario& scenario, Controller& controller, const Trajectory& trajectory) {
-  const auto require_joints = [&](const std::string& source, int joints) {
-    if (joints != scenario.joints()) {
-      throw InputError(source, "joints", std::to_string(joints),
-                       std::to_string(scenario.joints()) + " as in scenario '" + scenario.name + "'");
-    }
-  };
-  require_joints("controller", controller.joints());
-  require_joints("trajectory '" + trajectory.name() + "'", trajectory.joints());
+  require_joints(scenario, "controller", controller.joints());
   controller.reset();
-  return run_closed_loop(
-      scenario, controller.sample_period_s(), [&](const StepInput& input) { return controller.step(input); },
-      [&](double time_s) { return trajectory.evaluate(time_s); });
+  return follow(scenario, controller.sample_period_s(), trajectory,
+                [&](const StepInput& input) { return controller.step(input); });
+}
+
+RunRecord run_closed_loop(const Scenario& scenario, const Artifact& artifact, const Trajectory& trajectory) {
+  require_joints(scenario, "artifact '" + artifact.name() + "'", artifact.joints());
+  Controller controller(artifact);
+  const Monitor monitor(artifact);
+  std::vector<MonitorReport> seen;
+  RunRecord run = follow(scenario, artifact.sample_period_s(), trajectory, [&](const StepInput& input) {
+    const StepReport report = controller.step(input);
+    seen.push_back(monitor.observe(input, report));
+    return report;
+  });
+  MonitorColumns columns(run.samples);
+  for (const MonitorReport& sample : seen) {
+    columns.append(sample);
+  }
+  return run;
 }
 
 }  // namespace quasilpv

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 
+#include "quasilpv/monitor.hpp"
 #include "quasilpv/plant_sample.hpp"
 #include "quasilpv/record.hpp"
 #include "quasilpv/step.hpp"
@@ -39,6 +40,18 @@ class StepColumns {
   std::size_t torque_commanded_, torque_applied_;
   std::size_t estimated_angle_, estimated_speed_, estimated_disturbance_, filtered_disturbance_;
   std::size_t integral_error_, flags_;
+};
+
+/// Columns of the monitor: `membership_sum`, `premise_excess`, `lyapunov_rad2`.
+class MonitorColumns {
+ public:
+  /// INIT-ONLY. `record` must outlive this. Throws InputError if a column exists already.
+  explicit MonitorColumns(Record& record);
+  void append(const MonitorReport& seen);
+
+ private:
+  Record& record_;
+  std::size_t membership_sum_, premise_excess_, lyapunov_;
 };
 
 }  // namespace quasilpv

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 
+#include "quasilpv/artifact.hpp"
 #include "quasilpv/controller.hpp"
 #include "quasilpv/record.hpp"
 #include "quasilpv/scenario.hpp"
@@ -34,5 +35,8 @@ RunRecord run_closed_loop(const Scenario& scenario, double sample_period_s, cons
 /// The same with a controller, which is reset first, at its own sample period. Throws InputError also if scenario,
 /// controller and trajectory differ in the number of joints.
 RunRecord run_closed_loop(const Scenario& scenario, Controller& controller, const Trajectory& trajectory);
+
+/// The same with the controller and the monitor of an artifact: the record has the columns of MonitorColumns too.
+RunRecord run_closed_loop(const Scenario& scenario, const Artifact& artifact, const Trajectory& trajectory);
 
 }  // namespace quasilpv

@@ -45,6 +45,8 @@ _MEMBERS = {
 }
 """Which column each member of a message holds."""
 
+_MONITOR = ("membership_sum", "premise_excess", "lyapunov_rad2")
+
 
 @dataclass(frozen=True, eq=False)
 class RunDocuments:
@@ -76,7 +78,7 @@ class RunDocuments:
 def write_run(path: Path, documents: RunDocuments, columns: Columns) -> Path:
     """Write the log of a run in this process; its clock is that of the samples, k T, so equal runs give equal files.
 
-    Such a run has no fail-safe, no monitor and no times: its state is always "running", what these would say is 0.
+    Such a run has no fail-safe and no times: its state is always "running", what these would say is 0.
 
     Args:
         path: of the log.
@@ -93,6 +95,8 @@ def write_run(path: Path, documents: RunDocuments, columns: Columns) -> Path:
     for records in (streams["QLPV_COMMAND"], telemetry):
         records["flags"] = columns["flags"]
         records["state"] = RUNNING
+    for name in _MONITOR:
+        telemetry[name] = columns[name]
     premise = _premises(artifact, columns["measured_angle_rad"])
     telemetry["premises"] = premise.shape[1]
     telemetry["premise"][:, : premise.shape[1]] = premise

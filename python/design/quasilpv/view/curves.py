@@ -56,7 +56,7 @@ class Curves:
 
 
 def curves_of(playback: Playback) -> tuple[Curves, ...]:
-    """Errors, torques, disturbances with their estimates, and premise weights of a motion, each if there are any."""
+    """Errors, torques, disturbances, premise weights and Lyapunov function of a motion, each if there are any."""
     motion = playback.motion
     rows = np.unique(np.linspace(0, motion.samples - 1, MAX_POINTS).astype(np.int64))
     joints = [f"joint {k + 1}" for k in range(motion.angle_rad.shape[1])]
@@ -75,6 +75,8 @@ def curves_of(playback: Playback) -> tuple[Curves, ...]:
     if motion.weight.shape[1]:
         names = [f"premise {p + 1}" for p in range(motion.weight.shape[1])]
         plots.append(curves("weight of the upper vertex of each premise", motion.weight[rows], names))
+    if np.any(np.isfinite(motion.lyapunov_rad2)):
+        plots.append(curves("Lyapunov function, at least (rad²)", motion.lyapunov_rad2[rows, None], ["all joints"]))
     return tuple(plots)
 
 

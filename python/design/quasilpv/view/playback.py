@@ -38,6 +38,7 @@ class Motion:
         estimate: (N, n) disturbance as the law compensates it; rad/s^2 for acceleration-level laws, N m for the others.
         disturbance: (N, n) the true one in the same unit; NaN where it is not known.
         weight: (N, p) of the upper vertex of each premise, ``(z - lower) / (upper - lower)``, in [0, 1].
+        lyapunov_rad2: (N,) lower bound of the Lyapunov function; NaN where the controller has none.
         state: (N,) of the controller, index into `codes.STATES`.
         flags: (N,) fault bits; 0 is healthy.
         step_us: (N,) time of the control step; 0 where none was measured.
@@ -50,6 +51,7 @@ class Motion:
     estimate: FloatArray
     disturbance: FloatArray
     weight: FloatArray
+    lyapunov_rad2: FloatArray
     state: IntArray
     flags: IntArray
     step_us: FloatArray
@@ -67,6 +69,7 @@ class Motion:
             estimate=np.array(records["filtered_disturbance"][:, :n]),
             disturbance=np.full((records.size, n), np.nan),
             weight=(records["premise"][:, : table.premises] - table.lower) / span,
+            lyapunov_rad2=np.array(records["lyapunov_rad2"]),
             state=records["state"].astype(np.int64),
             flags=records["flags"].astype(np.int64),
             step_us=1e-3 * records["step_ns"],
