@@ -4,11 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <memory>
 #include <random>
 
 #include "control_law_fixture.hpp"
+#include "not_finite.hpp"
 #include "quasilpv/controller.hpp"
 
 namespace quasilpv {
@@ -17,6 +17,8 @@ namespace {
 using ::quasilpv::testing::artifact_table;
 using ::quasilpv::testing::has_schedule;
 using ::quasilpv::testing::json_twin;
+using ::quasilpv::testing::kInfinity;
+using ::quasilpv::testing::kNaN;
 using ::quasilpv::testing::kSamplePeriod;
 using ::quasilpv::testing::OutputStage;
 using ::quasilpv::testing::Sample;
@@ -32,9 +34,6 @@ using ::quasilpv::testing::WrittenOutHinfTracking;
 using ::quasilpv::testing::WrittenOutLaw;
 using ::quasilpv::testing::WrittenOutPid;
 using ::quasilpv::testing::WrittenOutStateFeedback;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Case {
   std::string kind;

@@ -4,37 +4,19 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "loop_fixture.hpp"
+#include "not_finite.hpp"
 #include "quasilpv/in_process_link.hpp"
 #include "quasilpv/link_robot.hpp"
 #include "quasilpv/run_controller.hpp"
 #include "scripted_robot.hpp"
 
-namespace quasilpv {
+namespace quasilpv::testing {
 namespace {
-
-using ::quasilpv::testing::artifact;
-using ::quasilpv::testing::artifact_table;
-using ::quasilpv::testing::at;
-using ::quasilpv::testing::identity_of;
-using ::quasilpv::testing::json_twin;
-using ::quasilpv::testing::kJoints;
-using ::quasilpv::testing::kLawKinds;
-using ::quasilpv::testing::kMillisecond;
-using ::quasilpv::testing::kSamplePeriod;
-using ::quasilpv::testing::kStart;
-using ::quasilpv::testing::measurement;
-using ::quasilpv::testing::reading;
-using ::quasilpv::testing::ScriptedRobot;
-using ::quasilpv::testing::trajectory;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<RobotReading> readings(std::int64_t count) {
   std::vector<RobotReading> result;
@@ -247,4 +229,4 @@ TEST(Faults, F18_the_commands_of_a_lock_step_run_do_not_depend_on_when_they_are_
 }
 
 }  // namespace
-}  // namespace quasilpv
+}  // namespace quasilpv::testing

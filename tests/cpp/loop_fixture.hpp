@@ -11,6 +11,7 @@
 #include "quasilpv/messages.hpp"
 #include "quasilpv/realtime.hpp"
 #include "quasilpv/scenario.hpp"
+#include "quasilpv/simulation.hpp"
 #include "quasilpv/trajectory.hpp"
 
 namespace quasilpv::testing {
@@ -56,6 +57,12 @@ inline Scenario scenario(std::int64_t samples) {
   scenario.transport_delay_s = 0.3 * kSamplePeriod;
   scenario.initial_angle = kStart;
   return scenario;
+}
+
+/// The run that every other way of running `experiment` must repeat bit for bit.
+inline RunRecord run_in_process(const Artifact& law, const Scenario& experiment) {
+  Controller controller(law);
+  return run_closed_loop(experiment, controller, trajectory());
 }
 
 inline WireIdentity identity_of(const Artifact& artifact) { return {11, artifact.hash_prefix(), artifact.joints()}; }

@@ -6,36 +6,20 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <thread>
 #include <utility>
 
 #include "loop_fixture.hpp"
+#include "not_finite.hpp"
 #include "quasilpv/errors.hpp"
 #include "quasilpv/in_process_link.hpp"
 #include "quasilpv/link_robot.hpp"
 #include "quasilpv/realtime.hpp"
 #include "quasilpv/run_controller.hpp"
 
-namespace quasilpv {
+namespace quasilpv::testing {
 namespace {
-
-using ::quasilpv::testing::artifact;
-using ::quasilpv::testing::artifact_table;
-using ::quasilpv::testing::at;
-using ::quasilpv::testing::identity_of;
-using ::quasilpv::testing::json_twin;
-using ::quasilpv::testing::kJoints;
-using ::quasilpv::testing::kMillisecond;
-using ::quasilpv::testing::kPatience;
-using ::quasilpv::testing::kSamplePeriod;
-using ::quasilpv::testing::kStart;
-using ::quasilpv::testing::measurement;
-using ::quasilpv::testing::reading;
-using ::quasilpv::testing::trajectory;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 JointArray torque_of(const ControlLoop& loop) { return loop.command().torque_nm; }
 
@@ -350,4 +334,4 @@ TEST_F(RunningController, when_no_plant_is_there_expect_an_end_after_the_timeout
 }
 
 }  // namespace
-}  // namespace quasilpv
+}  // namespace quasilpv::testing

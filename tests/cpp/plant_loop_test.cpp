@@ -14,19 +14,9 @@
 #include "quasilpv/in_process_link.hpp"
 #include "quasilpv/link_robot.hpp"
 #include "quasilpv/run_controller.hpp"
-#include "quasilpv/simulation.hpp"
 
-namespace quasilpv {
+namespace quasilpv::testing {
 namespace {
-
-using ::quasilpv::testing::artifact;
-using ::quasilpv::testing::at;
-using ::quasilpv::testing::identity_of;
-using ::quasilpv::testing::kJoints;
-using ::quasilpv::testing::kPatience;
-using ::quasilpv::testing::kSamplePeriod;
-using ::quasilpv::testing::scenario;
-using ::quasilpv::testing::trajectory;
 
 void expect_equal_columns(const Record& record, const Record& expected, const std::string& name,
                           const std::string& expected_name) {
@@ -51,8 +41,7 @@ TEST_P(EveryLaw, gives_over_a_link_in_lock_step_the_samples_of_the_in_process_ru
   constexpr std::int64_t kSamples = 400;
   const Artifact law = artifact(GetParam());
   const Scenario experiment = scenario(kSamples);
-  Controller controller(law);
-  const RunRecord in_process = run_closed_loop(experiment, controller, trajectory());
+  const RunRecord in_process = run_in_process(law, experiment);
 
   auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
   ControlLoop loop(law, trajectory(), {});
@@ -86,7 +75,7 @@ TEST_P(EveryLaw, gives_over_a_link_in_lock_step_the_samples_of_the_in_process_ru
   EXPECT_EQ(k, static_cast<std::size_t>(kSamples));
 }
 
-INSTANTIATE_TEST_SUITE_P(Loop, EveryLaw, ::testing::ValuesIn(::quasilpv::testing::kLawKinds), [](const auto& kind) {
+INSTANTIATE_TEST_SUITE_P(Loop, EveryLaw, ::testing::ValuesIn(kLawKinds), [](const auto& kind) {
   std::string name = kind.param;
   std::replace(name.begin(), name.end(), '-', '_');
   return name;
@@ -96,8 +85,7 @@ TEST(PlantLoop, when_the_first_copy_of_every_measurement_is_lost_expect_the_same
   constexpr std::int64_t kSamples = 5;
   const Artifact law = artifact();
   const Scenario experiment = scenario(kSamples);
-  Controller controller(law);
-  const RunRecord in_process = run_closed_loop(experiment, controller, trajectory());
+  const RunRecord in_process = run_in_process(law, experiment);
 
   auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
   std::thread thread([&, link = controller_end.get()] {
@@ -188,10 +176,10 @@ TEST(PlantLoop, F7_when_commands_stop_in_real_time_expect_the_torque_held_for_20
 TEST(PlantLoop, brakes_each_joint_with_the_time_constant_asked_for) {
   // A point mass m at distance l: inertia m l^2, so b = m l^2 / tau.
   Scenario pendulum = scenario(10);
-  pendulum.plant = ::quasilpv::testing::point_pendulum(0.7);
+  pendulum.plant = point_pendulum(0.7);
   pendulum.external_torque.clear();
   EXPECT_NEAR(viscous_brake(pendulum, 0.05)[0], 0.49 / 0.05, 1e-9);
 }
 
 }  // namespace
-}  // namespace quasilpv
+}  // namespace quasilpv::testing

@@ -11,17 +11,9 @@
 #include "quasilpv/link_robot.hpp"
 #include "quasilpv/plant_robot.hpp"
 #include "quasilpv/run_controller.hpp"
-#include "quasilpv/simulation.hpp"
 
-namespace quasilpv {
+namespace quasilpv::testing {
 namespace {
-
-using ::quasilpv::testing::artifact;
-using ::quasilpv::testing::identity_of;
-using ::quasilpv::testing::kSamplePeriod;
-using ::quasilpv::testing::measurement;
-using ::quasilpv::testing::scenario;
-using ::quasilpv::testing::trajectory;
 
 constexpr std::int64_t kSecond = kNanosecondsPerSecond;
 
@@ -29,8 +21,7 @@ TEST(PlantRobot, gives_under_run_controller_the_samples_of_the_in_process_run_bi
   constexpr std::int64_t kSamples = 300;
   const Artifact law = artifact();
   const Scenario experiment = scenario(kSamples);
-  Controller controller(law);
-  const RunRecord in_process = run_closed_loop(experiment, controller, trajectory());
+  const RunRecord in_process = run_in_process(law, experiment);
 
   PlantSession session(experiment, kSamplePeriod);
   PlantRobot robot(session);
@@ -127,4 +118,4 @@ TEST_F(OverALink, an_end_is_heard_from_the_plant_although_another_event_came_aft
 }
 
 }  // namespace
-}  // namespace quasilpv
+}  // namespace quasilpv::testing
