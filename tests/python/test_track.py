@@ -14,6 +14,7 @@ import pytest
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
 from quasilpv.artifact.canonical import canonical_json
+from quasilpv.certificate import verify
 from quasilpv.errors import ClaimError, InfeasibleError, InputError
 from quasilpv.experiments import designs
 from quasilpv.experiments.disturbance import true_disturbance
@@ -24,7 +25,8 @@ from quasilpv.experiments.run import FloatArray
 from quasilpv.experiments.track import TrackingExperiment, run_from_columns, track
 from quasilpv.release import release
 from quasilpv.scenarios import IdaIntegrator, Rk4Integrator, Scenario, Sensors, build_scenario
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import Specification, TrackingDesign, synthesise
+from quasilpv.systems.registry import Robot
 from reference.runs import synthetic_run
 
 EXACT = Sensors(encoder_bits=0, velocity_noise_rad_s=0.0)
@@ -108,8 +110,32 @@ def test_when_a_design_was_made_before_expect_it_read_and_not_made_again(
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("designed again")
 
-    monkeypatch.setattr(designs, "release", refuse)
+    monkeypatch.setattr(designs, "synthesise", refuse)
+    monkeypatch.setattr(designs, "checked_artifact", refuse)
     assert design(tmp_path, "pid").hash == made.hash
+
+
+def test_when_a_law_runs_with_and_without_compensation_expect_its_gains_searched_for_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searched: list[str] = []
+
+    def counted(source: Robot, controller: str, *arguments: Any, **options: Any) -> TrackingDesign:
+        searched.append(controller)
+        return synthesise(source, controller, *arguments, **options)
+
+    monkeypatch.setattr(designs, "synthesise", counted)
+    monkeypatch.setattr(designs, "_designs", {})
+    without, whole = (design(tmp_path, "dob-acceleration", compensate=compensate) for compensate in (False, True))
+    assert searched == ["dob-acceleration"]
+    assert (without.law.disturbance_compensation, whole.law.disturbance_compensation) == (False, True)
+    for artifact in (without, whole):
+        assert verify(artifact.content()).verified
+        assert artifact.verification["gate"]["passed"]
+    assert len(list(tmp_path.iterdir())) == 2
+    design(tmp_path, "dob-acceleration")
+    designs.kept_design("arm3", "dob-acceleration", Specification(encoder_bits=17), folder=tmp_path)
+    assert searched == ["dob-acceleration"] * 2
 
 
 def test_when_a_kept_design_is_damaged_expect_it_made_again(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from quasilpv.artifact.canonical import document_hash
 from quasilpv.artifact.compilation import compile_program
 from quasilpv.certificate import CHECKERS, gate, verify
 from quasilpv.errors import ClaimError
-from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, TrackingDesign, synthesise
+from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, TrackingDesign, synthesise, without_compensation
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.baselines import reference_speeds
 from quasilpv.systems.registry import Robot, robot
@@ -53,22 +53,18 @@ def release(
         robot_id: name in the registry of robots.
         controller: one of `quasilpv.synthesis.CONTROLLERS`.
         specification: what is asked for.
-        disturbance_compensation: of `dob-acceleration`.
+        disturbance_compensation: see `without_compensation`.
         allow_unverified: release a design whose claims do not hold or that fails its gate, marked as such.
         progress: called with (points done, points in all).
 
     Raises:
-        InputError: unknown robot or controller.
+        InputError: unknown robot or controller, or a law that cannot do without compensation.
         InfeasibleError: no design meets the specification.
         ClaimError: a claim does not hold, or the robust gate is not passed.
     """
-    design = synthesise(
-        robot(robot_id),
-        controller,
-        specification,
-        disturbance_compensation=disturbance_compensation,
-        progress=progress,
-    )
+    design = synthesise(robot(robot_id), controller, specification, progress=progress)
+    if not disturbance_compensation:
+        design = without_compensation(design)
     return Release(checked_artifact(design, allow_unverified), design.report)
 
 

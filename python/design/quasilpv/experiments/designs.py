@@ -11,8 +11,8 @@ from quasilpv.artifact import Artifact, read_artifact, write_artifact
 from quasilpv.artifact.canonical import document_hash
 from quasilpv.artifact.store import JSON_NAME
 from quasilpv.errors import InputError
-from quasilpv.release import design_inputs, release
-from quasilpv.synthesis import Specification
+from quasilpv.release import checked_artifact, design_inputs
+from quasilpv.synthesis import Specification, TrackingDesign, synthesise, without_compensation
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.systems.registry import robot
 
@@ -32,6 +32,10 @@ _DESIGN_ROOMS = (
     "release.py",
 )
 
+_designs: dict[tuple[str, str, Specification], TrackingDesign] = {}
+"""Of this process. The folder holds artifacts, and those with and without compensation are two, each with its own proof
+of the same gains."""
+
 
 def kept_design(
     robot_id: str,
@@ -48,7 +52,7 @@ def kept_design(
         robot_id: name in the registry of robots.
         controller: one of `quasilpv.synthesis.CONTROLLERS`.
         specification: what is asked for.
-        disturbance_compensation: of `dob-acceleration`.
+        disturbance_compensation: see `without_compensation`; the gains are searched for once for both.
         folder: the cache; each design is a folder of it, named by the hash of its inputs and of the design code.
         progress: called with (points done, points in all) while a design is made.
 
@@ -67,11 +71,17 @@ def kept_design(
     try:
         return read_artifact(place / JSON_NAME)
     except InputError:  # not there, or damaged: made again
-        made = release(
-            robot_id, controller, specification, disturbance_compensation=disturbance_compensation, progress=progress
-        )
-        write_artifact(place, made.artifact)
-        return made.artifact
+        design = _designed(robot_id, controller, specification, progress)
+        made = checked_artifact(design if disturbance_compensation else without_compensation(design))
+        write_artifact(place, made)
+        return made
+
+
+def _designed(robot_id: str, controller: str, specification: Specification, progress: Progress) -> TrackingDesign:
+    asked = robot_id, controller, specification
+    if asked not in _designs:
+        _designs[asked] = synthesise(robot(robot_id), controller, specification, progress=progress)
+    return _designs[asked]
 
 
 @cache

@@ -88,7 +88,15 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
 
 DEFAULT_CONTROLLER = "dob-acceleration"
 
-__all__ = ["CONTROLLERS", "DEFAULT_CONTROLLER", "Specification", "TrackingDesign", "controller_kind", "synthesise"]
+__all__ = [
+    "CONTROLLERS",
+    "DEFAULT_CONTROLLER",
+    "Specification",
+    "TrackingDesign",
+    "controller_kind",
+    "synthesise",
+    "without_compensation",
+]
 
 
 def controller_kind(controller: str) -> ControllerKind:
@@ -107,7 +115,6 @@ def synthesise(
     controller: str = DEFAULT_CONTROLLER,
     specification: Specification | None = None,
     *,
-    disturbance_compensation: bool = True,
     progress: Progress = no_progress,
 ) -> TrackingDesign:
     """Design one controller for one robot.
@@ -118,21 +125,28 @@ def synthesise(
         specification: what is asked for (default: that of `Specification`, at the controller's own rate and
             the robot's own frequency of disturbances); baselines use
             its sample rate only.
-        disturbance_compensation: False leaves the observed disturbance out of the torque of `dob-acceleration`, to show
-            what it is worth.
         progress: called with (points done, points in all).
 
     Raises:
-        InputError: unknown controller, or compensation switched off for a law that cannot do without.
+        InputError: unknown controller.
         InfeasibleError: no design meets the specification.
     """
     kind = controller_kind(controller)
     default = Specification(rate_hz=kind.rate_hz, disturbance_frequency_rad_s=robot.disturbance_frequency_rad_s)
-    design = kind.design(robot, specification or default, progress)
-    if disturbance_compensation:
-        return design
+    return kind.design(robot, specification or default, progress)
+
+
+def without_compensation(design: TrackingDesign) -> TrackingDesign:
+    """The same gains with the observed disturbance left out of the torque, to show what it is worth.
+
+    Args:
+        design: of a law that has the choice.
+
+    Raises:
+        InputError: the law cannot do without.
+    """
     if "disturbance_compensation" not in design.law:
-        raise InputError(controller, "disturbance_compensation", "off", "dob-acceleration, the law that has it")
+        raise InputError(design.controller, "disturbance_compensation", "off", "dob-acceleration, the law that has it")
     without = {"disturbance_compensation": False}
     # The envelope and the Lyapunov function are those of the compensated loop.
     law = {name: member for name, member in design.law.items() if name != "lyapunov_bound"}
