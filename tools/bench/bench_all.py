@@ -96,7 +96,7 @@ def print_changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
         (each.name, f"{each.old:.4g}", f"{each.new:.4g}", factor(each.ratio), factor(each.noise), each.mark)
         for each in changes(old, new)
     ]
-    title = "new / old; noise: the factor that the same code can differ by, in these two runs; ~ within it"
+    title = "noise: the factor that the same code can differ by; ~ is within it"
     print_cells(title, ("", "old", "new", "new / old", "noise", ""), rows)
 
 
