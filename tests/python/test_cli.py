@@ -342,6 +342,7 @@ def test_when_run_over_lcm_in_lock_step_expect_the_run_in_process(design: Design
     assert row["mode"] == "lockstep"
     assert row["identical_to_in_process"] is True
     assert {name: row[name] for name in row["in_process"]} == row["in_process"]
+    assert sorted(path.name for path in Path().rglob("*.lcmlog")) == ["run.lcmlog", "wire.lcmlog"]
 
 
 def test_when_run_in_real_time_expect_latencies_beside_both_accuracies(design: Design) -> None:
@@ -359,9 +360,10 @@ def test_when_run_in_real_time_expect_latencies_beside_both_accuracies(design: D
 def test_when_a_fault_stops_a_real_time_run_expect_exit_3_one_line_and_both_reports(design: Design) -> None:
     # No machine answers within the millisecond in every sample of seconds: the watchdogs act.
     watchdogs = ["--silence-s", "0.001", "--hold-s", "0.001"]
-    outcome = design("hil", "serial-circle", "--controller", "ctc", "--real-time", *watchdogs, "--json")
+    outcome = design("hil", "serial-circle", "--controller", "ctc", "--real-time", *watchdogs, "--no-log", "--json")
     row = json.loads(outcome.out)
     assert outcome.code == 3
+    assert not list(Path().rglob("*.lcmlog"))
     assert outcome.err.splitlines() == [f"error: {row['fault']}"]
     assert row["controller_report"]["fault_cause"] == "plant silent"
     assert row["controller_report"]["post_mortem"]["seq"]

@@ -8,7 +8,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from quasilpv.cli.console import JsonOption, Steps, print_json, print_note, progress
-from quasilpv.cli.options import EncoderOption, PlantOption, RateOption, plant_kind
+from quasilpv.cli.options import EncoderOption, LogOption, PlantOption, RateOption, plant_kind
 from quasilpv.cli.results import print_results
 from quasilpv.cli.session import Session, draw_results
 from quasilpv.experiments.result import TrackResult, Variant
@@ -38,6 +38,7 @@ def animate_command(
         Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for animations, run files and figures.")
     ] = Path("out/animate"),
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures of every run too.")] = True,
+    log: LogOption = True,
     json: JsonOption = False,
 ) -> None:
     """Run scenarios with the default controller, with and without compensation of the disturbance it observes.
@@ -51,7 +52,7 @@ def animate_command(
     experiments = [TrackingExperiment.registered(name) for name in dict.fromkeys(scenarios or DEFAULT_SCENARIOS)]
     bits = ENCODER_BITS if encoder_bits is None else encoder_bits
     variants = [Variant(DEFAULT_CONTROLLER, bits, compensated) for compensated in (False, True)]
-    session = Session(None, rate_hz, cast(PlantKind, plant_kind(plant)), out)
+    session = Session(None, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
     results: list[TrackResult] = []
     made: list[dict[str, Any]] = []
     with progress(len(experiments) * (len(variants) + 1)) as steps:

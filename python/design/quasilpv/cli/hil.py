@@ -12,18 +12,19 @@ from quasilpv.cli.console import JsonOption, print_json, print_table, progress
 from quasilpv.cli.options import (
     ArtifactOption,
     EncoderOption,
+    LogOption,
     PlantOption,
     RateOption,
-    designed,
     plant_kind,
     require_controller,
     sensors_of,
 )
 from quasilpv.cli.results import COLUMNS, cells
+from quasilpv.cli.session import Session
 from quasilpv.errors import FaultStop, InputError
-from quasilpv.experiments.hil import HilResult, Mode, RealTimeOptions, require_identical, run_over_lcm
+from quasilpv.experiments.hil import HilResult, RealTimeOptions, require_identical, run_over_lcm
 from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, track, variant_of
+from quasilpv.experiments.track import PlantKind, TrackingExperiment, variant_of
 from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
@@ -61,6 +62,7 @@ def hil_command(
     out: Annotated[
         Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for run files, records and logs.")
     ] = Path("out/hil"),
+    log: LogOption = True,
     json: JsonOption = False,
 ) -> None:
     """Run a scenario with controller and plant as two processes over LCM, and once more in this process.
@@ -75,34 +77,19 @@ def hil_command(
     """
     if priority is not None and not real_time:
         raise InputError("command line", "--priority", priority, "nothing without --real-time: lock-step has no clock")
-    experiment = TrackingExperiment.registered(scenario)
-    kind = cast(PlantKind, plant_kind(plant))
-    variant = Variant(require_controller(controller), ENCODER_BITS if encoder_bits is None else encoder_bits)
-    sensors = sensors_of(variant.encoder_bits)
     given = None if artifact is None else read_artifact(artifact)
-    with progress(2) as steps:
-        steps.begin("in process")
-        chosen = given or designed(experiment.robot.id, variant, rate_hz, steps.parts)
-        if given is not None:
-            variant = variant_of(given, sensors)
-        folder = out / experiment.name / variant.slug
-        in_process = track(experiment, chosen, folder, plant=kind, sensors=sensors, variant=variant)
-        steps.end()
-        steps.begin("over LCM")
-        mode: Mode = "realtime" if real_time else "lockstep"
-        over_lcm = run_over_lcm(
-            experiment,
-            chosen,
-            folder,
-            plant=kind,
-            sensors=sensors,
-            mode=mode,
-            real_time=RealTimeOptions(silence_s, hold_s, priority),
-            variant=variant,
-            url=url,
-            key=key,
-        )
-        steps.end()
+    variant = Variant(require_controller(controller), ENCODER_BITS if encoder_bits is None else encoder_bits)
+    if given is not None:
+        variant = variant_of(given, sensors_of(variant.encoder_bits))
+    session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
+    over_lcm, in_process = _run_both(
+        session,
+        TrackingExperiment.registered(scenario),
+        variant,
+        RealTimeOptions(silence_s, hold_s, priority) if real_time else None,
+        url=url,
+        key=key,
+    )
     if not real_time and over_lcm.fault is None:
         require_identical(over_lcm.result.run, in_process.run)
     if json:
@@ -111,6 +98,38 @@ def hil_command(
         _print(over_lcm, in_process)
     if over_lcm.fault is not None:
         raise FaultStop(over_lcm.fault)
+
+
+def _run_both(
+    session: Session,
+    experiment: TrackingExperiment,
+    variant: Variant,
+    real_time: RealTimeOptions | None,
+    *,
+    url: str | None,
+    key: Path | None,
+) -> tuple[HilResult, TrackResult]:
+    """The run over LCM, in lock-step without options of real time, and the same in this process."""
+    with progress(2) as steps:
+        steps.begin("in process")
+        in_process = session.run(experiment, variant, steps)
+        steps.end()
+        steps.begin("over LCM")
+        over_lcm = run_over_lcm(
+            experiment,
+            session.controller(experiment, variant, steps),
+            session.folder(experiment, variant),
+            plant=session.plant,
+            sensors=sensors_of(variant.encoder_bits),
+            mode="lockstep" if real_time is None else "realtime",
+            real_time=real_time,
+            variant=variant,
+            url=url,
+            key=key,
+            log=session.log,
+        )
+        steps.end()
+    return over_lcm, in_process
 
 
 def _row(over_lcm: HilResult, in_process: TrackResult) -> dict[str, Any]:

@@ -59,6 +59,7 @@ ActivityOption: TypeAlias = Annotated[
 PlantOption: TypeAlias = Annotated[
     str, typer.Option("--plant", help="nominal, or perturbed: the full payload the design must cover.")
 ]
+LogOption: TypeAlias = Annotated[bool, typer.Option("--log/--no-log", help="Write the log of every run.")]
 ArtifactOption: TypeAlias = Annotated[
     Path | None, typer.Option("--artifact", metavar="FILE", help="Use this controller instead of designing one.")
 ]

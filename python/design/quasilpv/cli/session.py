@@ -23,19 +23,34 @@ class Session:
         rate_hz: sample rate of designs; None for that of the controller.
         plant: the true plant.
         out: folder of all runs.
+        log: write the log of every run.
     """
 
     given: Artifact | None
     rate_hz: float | None
     plant: PlantKind
     out: Path
+    log: bool = True
+
+    def controller(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> Artifact:
+        """The controller of a run: the given one, or the variant's design."""
+        return self.given or designed(experiment.robot.id, variant, self.rate_hz, progress=steps.parts)
+
+    def folder(self, experiment: TrackingExperiment, variant: Variant) -> Path:
+        """Where the files of a run are."""
+        return self.out / experiment.name / variant.slug
 
     def run(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> TrackResult:
         """Design, if no controller is given, and run one variant in closed loop."""
-        artifact = self.given or designed(experiment.robot.id, variant, self.rate_hz, progress=steps.parts)
-        folder = self.out / experiment.name / variant.slug
-        sensors = sensors_of(variant.encoder_bits)
-        return track(experiment, artifact, folder, plant=self.plant, sensors=sensors, variant=variant)
+        return track(
+            experiment,
+            self.controller(experiment, variant, steps),
+            self.folder(experiment, variant),
+            plant=self.plant,
+            sensors=sensors_of(variant.encoder_bits),
+            variant=variant,
+            log=self.log,
+        )
 
 
 def draw_results(results: Sequence[TrackResult], out: Path) -> None:

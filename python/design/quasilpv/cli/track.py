@@ -14,6 +14,7 @@ from quasilpv.cli.console import JsonOption, print_json, progress
 from quasilpv.cli.options import (
     ArtifactOption,
     EncoderOption,
+    LogOption,
     PlantOption,
     RateOption,
     plant_kind,
@@ -71,6 +72,7 @@ def track_command(
     figures: Annotated[
         bool | None, typer.Option("--figures/--no-figures", help="Draw figures.  [default: not with --json]")
     ] = None,
+    log: LogOption = True,
     json: JsonOption = False,
 ) -> None:
     """Run scenarios in closed loop: every controller, one table, figures of every run.
@@ -89,7 +91,7 @@ def track_command(
         raise InputError("command line", "SCENARIO", "nothing", "at least one scenario id or --trajectory FILE")
     given = None if artifact is None else _given(artifact, controllers, rate_hz, no_compensation)
     variants = _variants(given, controllers, encoder_bits, no_compensation)
-    session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out)
+    session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
     results = run_all(session, experiments, variants)
     if not json if figures is None else figures:
         draw_results(results, out)

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -101,6 +102,7 @@ def run_over_lcm(
     variant: Variant | None = None,
     url: str | None = None,
     key: Path | None = None,
+    log: bool = True,
 ) -> HilResult:
     """Run controller and plant as two processes on this machine, with a session of their own; log what they say.
 
@@ -115,6 +117,7 @@ def run_over_lcm(
         variant: what to call the controller, by default its law kind.
         url: where they talk, by default on a port of their own.
         key: of authenticated mode, a file of mode 0600; None: messages are not authenticated.
+        log: write the log of the run.
 
     Raises:
         InputError: robot and controller do not fit, an executable is missing, or the folder cannot be written.
@@ -131,9 +134,10 @@ def run_over_lcm(
         commands = {name: [*command, *(real_time or RealTimeOptions()).of(name)] for name, command in commands.items()}
     limit_s = LOCK_STEP_LIMIT_S if mode == "lockstep" else experiment.trajectory.duration_s + 4 * SILENCE_S
     documents = run_documents(mode, files, experiment, artifact, variant or variant_of(artifact, sensors))
-    with Recorder(url, folder / WIRE_LOG_NAME, documents) as recorder:
+    with Recorder(url, folder / WIRE_LOG_NAME, documents) if log else nullcontext() as recorder:
         reports, fault = _run_both(commands, limit_s)
-        recorder.add_truth(read_record(records[SIMULATOR], artifact.joints))
+        if recorder is not None:
+            recorder.add_truth(read_record(records[SIMULATOR], artifact.joints))
     run = merge_records(records[SIMULATOR], records[CONTROLLER], artifact)
     return HilResult(
         mode,
