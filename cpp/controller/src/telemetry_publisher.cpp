@@ -67,7 +67,7 @@ void TelemetryPublisher::write_header() {
         "estimated_speed_rad_s", "estimated_disturbance", "filtered_disturbance", "integral_error_rad_s"}) {
     record_->head(name, joints_);
   }
-  for (const char* name : {"flags", "state", "step_ns"}) {
+  for (const char* name : {"membership_sum", "premise_excess", "lyapunov_rad2", "flags", "state", "step_ns"}) {
     record_->head(name);
   }
   record_->end_row();
@@ -82,6 +82,9 @@ void TelemetryPublisher::write_row(const telemetry_v1& sample) {
         sample.applied_torque_nm, sample.estimated_angle_rad, sample.estimated_speed_rad_s,
         sample.estimated_disturbance, sample.filtered_disturbance, sample.integral_error_rad_s}) {
     record_->add(values, joints_);
+  }
+  for (const double value : {sample.membership_sum, sample.premise_excess, sample.lyapunov_rad2}) {
+    record_->add(value);
   }
   record_->add(static_cast<std::int64_t>(sample.flags));
   record_->add(static_cast<std::int64_t>(sample.state));
