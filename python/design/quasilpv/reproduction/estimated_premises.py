@@ -12,7 +12,7 @@ from quasilpv.conditions.mismatch import FloatArray
 from quasilpv.errors import InfeasibleError
 from quasilpv.figures.style import BLUE, GREEN, ORANGE, VERMILION, legend_below, new_figure, style
 from quasilpv.reproduction import rules
-from quasilpv.reproduction.item import Effort, Finding, Item
+from quasilpv.reproduction.item import Check, Effort, Finding, Item
 from quasilpv.scenarios import tracking_task
 from quasilpv.studies.eigenvalue_bounds import Bound
 from quasilpv.studies.speed_estimates import Observer, speed_errors
@@ -123,13 +123,18 @@ def _fastest(mismatch: float, decays_per_s: tuple[float, ...]) -> SpeedObserver:
     return found
 
 
+def _middle() -> FloatArray:
+    """The middle of the premises of the inertia."""
+    arm = robot("arm3")
+    return np.array([(p.lower + p.upper) / 2.0 for p in arm.model.inertia_premises(arm.domain)])
+
+
 def _observers(proved: SpeedObserver) -> dict[str, Observer]:
     """Estimated or lumped, without and with an observed disturbance, whose poles are as fast as the fastest proved."""
     arm = robot("arm3")
     n = arm.model.joints
     one, none = np.eye(n), np.zeros((n, n))
-    middle = np.array([(p.lower + p.upper) / 2.0 for p in arm.model.inertia_premises(arm.domain)])
-    chain = np.block([[none, one], [none, none]]) - proved.gain(middle) @ np.hstack([one, none])
+    chain = np.block([[none, one], [none, none]]) - proved.gain(_middle()) @ np.hstack([one, none])
     w = float(np.abs(np.linalg.eigvals(chain)).max())
     observed = np.vstack([4 * w * one, 6 * w**2 * one, 4 * w**3 * one, w**4 * one])
 
@@ -145,10 +150,37 @@ def _observers(proved: SpeedObserver) -> dict[str, Observer]:
 
 
 def _study(effort: Effort) -> Finding:
-    arm = robot("arm3")
-    trajectory = tracking_task("serial-square").trajectory(arm.model, arm.domain)
     mismatch = _classes().energy.proved
     proved = _fastest(mismatch, DECAYS_PER_S)
+    time_s, errors = _simulated(proved, effort)
+    settled = time_s >= SETTLED_S
+    rms = {
+        plant: {name: float(np.sqrt(np.mean(np.sum(e[settled] ** 2, axis=1)))) for name, e in by_observer.items()}
+        for plant, by_observer in errors.items()
+    }
+    words = "; ".join(
+        f"{plant}: " + ", ".join(f"{name} {value:.3g} rad/s" for name, value in values.items())
+        for plant, values in rms.items()
+    )
+    computed = {
+        "decay_rate_per_s": proved.decay_per_s,
+        "mismatch_per_s": mismatch,
+        "rms_speed_error_rad_s": rms,
+        "gains_at_the_middle": proved.gain(_middle()).tolist(),
+    }
+    return Finding(
+        _study_checks(mismatch, proved, rms["nominal plant"], rms["loaded plant"]),
+        computed,
+        {"": _errors_figure(time_s, errors)},
+        instead=f"Root mean square errors: {words}. With the right model the estimate is exact: what is left is the"
+        " step of the integration",
+    )
+
+
+def _simulated(proved: SpeedObserver, effort: Effort) -> tuple[FloatArray, dict[str, dict[str, FloatArray]]]:
+    """Times, (N,), and the error of the estimated speeds on the square, (N, 3), by plant and observer."""
+    arm = robot("arm3")
+    trajectory = tracking_task("serial-square").trajectory(arm.model, arm.domain)
     time_s = np.arange(0.0, trajectory.duration_s if effort is Effort.FULL else 1.0, STEP_S[effort])
 
     def motion(t: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -156,26 +188,24 @@ def _study(effort: Effort) -> Finding:
         return point.angle, point.speed, point.acceleration
 
     plants = {"nominal plant": arm.model, "loaded plant": arm.with_payload_fraction(1.0)}
-    box = np.array(arm.domain.speed_rad_s).T
-    errors = {
+    return time_s, {
         name: speed_errors(
             _observers(proved),
             arm.model,
             plant,
             motion,
-            speed_box=box,
+            speed_box=np.array(arm.domain.speed_rad_s).T,
             time_s=time_s,
             first_error_rad_s=FIRST_ERROR_RAD_S,
         )
         for name, plant in plants.items()
     }
-    settled = time_s >= SETTLED_S
-    rms = {
-        name: {key: float(np.sqrt(np.mean(np.sum(e[settled] ** 2, axis=1)))) for key, e in by_observer.items()}
-        for name, by_observer in errors.items()
-    }
-    nominal, loaded = rms["nominal plant"], rms["loaded plant"]
-    checks = [
+
+
+def _study_checks(
+    mismatch: float, proved: SpeedObserver, nominal: dict[str, float], loaded: dict[str, float]
+) -> list[Check]:
+    return [
         rules.fact(
             "(own) an observer scheduled with estimated speeds exists with a proof over the whole domain",
             proved.decay_per_s > 0.0,
@@ -192,25 +222,6 @@ def _study(effort: Effort) -> Finding:
             ", ".join(f"{name} {value:.3g}" for name, value in loaded.items()),
         ),
     ]
-    words = "; ".join(
-        f"{plant}: " + ", ".join(f"{name} {value:.3g} rad/s" for name, value in values.items())
-        for plant, values in rms.items()
-    )
-    computed = {
-        "decay_rate_per_s": proved.decay_per_s,
-        "mismatch_per_s": mismatch,
-        "rms_speed_error_rad_s": rms,
-        "gains_at_the_middle": proved.gain(
-            np.array([(p.lower + p.upper) / 2.0 for p in arm.model.inertia_premises(arm.domain)])
-        ).tolist(),
-    }
-    return Finding(
-        checks,
-        computed,
-        {"": _errors_figure(time_s, errors)},
-        instead=f"Root mean square errors: {words}. With the right model the estimate is exact: what is left is the"
-        " step of the integration",
-    )
 
 
 def _errors_figure(time_s: FloatArray, errors: dict[str, dict[str, FloatArray]]) -> Figure:
