@@ -21,6 +21,7 @@ from quasilpv.certificate.sampled_envelope import ErrorDynamics
 from quasilpv.conditions.sampled_errors import SampledErrors, sampled_errors
 from quasilpv.errors import InputError
 from quasilpv.release import release
+from quasilpv.synthesis.operating_envelope import acceleration_envelope
 from quasilpv.systems.registry import robot
 
 FloatArray = npt.NDArray[np.float64]
@@ -298,6 +299,17 @@ def test_when_the_disturbance_is_not_compensated_expect_no_envelope_and_none_acc
     content["witness"]["envelope"] = envelope()
     with pytest.raises(InputError, match="does not compensate"):
         verify(content)
+
+
+def test_when_the_usual_room_inside_the_inequalities_is_not_enough_expect_a_level_set_all_the_same() -> None:
+    # Gains of dob-moving for arm3 at 2 kHz: 2 % of the optimum leave exact arithmetic no room.
+    law = kept()["law"] | {
+        "feedback": {"kp": -5901.441566279088, "kd": -132.07447078043936, "ki": -80519.203199032},
+        "observer": [0.9965569726662122, 2954.9900360262554, 4645904.5192633085, 3024492837.480565],
+        "filter_time_constant_s": 0.0006777015027073835,
+    }
+    found = acceleration_envelope(robot("arm3"), law, 0.0005, 47.885616674642094)
+    assert np.linalg.eigvalsh(found["box_set"]["P"]).min() > 0.0
 
 
 def test_when_the_levels_are_read_expect_the_stated_margin_of_the_operating_domain() -> None:

@@ -74,7 +74,7 @@ def test_when_the_specification_changes_expect_another_design_hash() -> None:
 def test_when_the_specification_cannot_be_met_expect_one_line_that_says_why(
     specification: Specification, reason: str
 ) -> None:
-    with pytest.raises(InfeasibleError, match=rf"arm3: no dob-acceleration design at 1000 Hz: .*{reason}") as caught:
+    with pytest.raises(InfeasibleError, match=rf"arm3: no acceleration-level design at 1000 Hz: .*{reason}") as caught:
         release("arm3", specification=specification)
     assert "\n" not in str(caught.value)
 

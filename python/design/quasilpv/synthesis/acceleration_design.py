@@ -220,7 +220,7 @@ def design_acceleration_law(
 def _why_not(search: _Search) -> str:
     """One line: which requirement no point of the search met, wanted and found."""
     wanted = search.specification
-    about = f"{search.robot.id}: no dob-acceleration design at {wanted.rate_hz:g} Hz"
+    about = f"{search.robot.id}: no acceleration-level design at {wanted.rate_hz:g} Hz"
     if math.isinf(search.quietest_nm):
         spans = f"must span {search.tolerance.span:.3g} to 1, the widest found spans {search.widest_span:.3g}"
         return f"{about}: the tolerated inertias {spans}"

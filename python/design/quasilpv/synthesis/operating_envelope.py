@@ -31,7 +31,9 @@ TORQUE_SHARE = 0.5
 DECAY_SHARE = 0.1
 """Decay rate of the level sets over that of the slowest pole: the faster, the smaller the set."""
 
-BACK_OFF = 0.02
+BACK_OFFS = (0.02, 0.05, 0.1, 0.2)
+"""Shares of the optimum to give up for room inside the inequalities: the first with which exact arithmetic agrees."""
+
 ROUNDING = 1e-9
 SPARE = 1e-3
 """By how much a bound exceeds what its set reaches, relative: room for exact arithmetic, and for the eye."""
@@ -91,10 +93,11 @@ def verified_solution(problem: Problem, about: str) -> Solution:
     Raises:
         InfeasibleError: none was found that exact arithmetic confirms.
     """
-    solution = problem.solve_inside(BACK_OFF)
-    if not solution.verified:
-        raise InfeasibleError(f"{about}: operating envelope: {solution.outcome.value}")
-    return solution
+    for back_off in BACK_OFFS:
+        solution = problem.solve_inside(back_off)
+        if solution.verified:
+            return solution
+    raise InfeasibleError(f"{about}: operating envelope: {solution.outcome.value}")
 
 
 def _level_set(
