@@ -39,9 +39,9 @@ LIMIT_S = 60.0
 
 
 def executable(name: str) -> str:
-    """Path of a built executable: in $QUASILPV_BIN, beside the interpreter, in a build tree, or on PATH."""
+    """Path of a built executable: in $QUASILPV_BIN, beside the interpreter, in the release build, or on PATH."""
     folders = [os.environ.get("QUASILPV_BIN", ""), str(Path(sys.executable).parent)]
-    folders += [str(path.parent) for path in sorted(ROOT.glob(f"build/*/cpp/*/{name}"))]
+    folders += [str(path.parent) for path in sorted(ROOT.glob(f"build/release/cpp/*/{name}"))]
     found = shutil.which(name, path=os.pathsep.join(filter(None, folders))) or shutil.which(name)
     if found is None:
         pytest.skip(f"{name} is not built")
