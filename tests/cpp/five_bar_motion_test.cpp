@@ -116,7 +116,7 @@ double largest_gap(const FiveBar& five_bar, const std::vector<VectorXd>& states)
 double largest_angle_difference(const std::vector<VectorXd>& a, const std::vector<VectorXd>& b) {
   double difference = 0.0;
   for (std::size_t k = 0; k < a.size(); ++k) {
-    difference = std::max(difference, (a[k] - b[k]).head<2>().cwiseAbs().maxCoeff());
+    difference = std::max(difference, (a[k].head<2>() - b[k].head<2>()).cwiseAbs().maxCoeff());
   }
   return difference;
 }
