@@ -7,26 +7,14 @@
 #include <memory>
 
 #include "artifact_fixture.hpp"
+#include "counting.hpp"
 #include "quasilpv/controller.hpp"
 #include "quasilpv/trajectory.hpp"
 #include "quiet_robot.hpp"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define QUASILPV_COUNTS_ALLOCATIONS 0  // sanitizers bring their own malloc
-#else
-#define QUASILPV_COUNTS_ALLOCATIONS 1
-#endif
+#if QUASILPV_COUNTS_CALLS
+using ::quasilpv::testing::count;
 
-namespace {
-
-thread_local bool counting = false;
-thread_local int allocations = 0;
-
-[[maybe_unused]] void count() noexcept { allocations += counting ? 1 : 0; }
-
-}  // namespace
-
-#if QUASILPV_COUNTS_ALLOCATIONS
 // NOLINTBEGIN(bugprone-reserved-identifier): glibc's own entry points, so that the replacements need no dlsym.
 extern "C" {
 void* __libc_malloc(std::size_t size);
@@ -67,6 +55,7 @@ namespace quasilpv {
 namespace {
 
 using ::quasilpv::testing::artifact_table;
+using ::quasilpv::testing::calls_in;
 using ::quasilpv::testing::json_twin;
 using ::quasilpv::testing::kLawKinds;
 using ::quasilpv::testing::kPaces;
@@ -74,20 +63,10 @@ using ::quasilpv::testing::make_loop;
 using ::quasilpv::testing::QuietRobot;
 using ::quasilpv::testing::run_control_thread;
 
-// Allocations made by `action`.
-template <class Action>
-int allocations_of(Action action) {
-  allocations = 0;
-  counting = true;
-  action();
-  counting = false;
-  return allocations;
-}
-
 class Allocation : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (QUASILPV_COUNTS_ALLOCATIONS == 0) {
+    if (QUASILPV_COUNTS_CALLS == 0) {
       GTEST_SKIP() << "the sanitizer replaces malloc itself";
     }
   }
@@ -99,11 +78,11 @@ struct alignas(64) Overaligned {
 
 TEST_F(Allocation, is_counted_for_new_for_aligned_new_and_for_dynamic_eigen) {
   std::unique_ptr<int> plain;
-  EXPECT_EQ(allocations_of([&] { plain = std::make_unique<int>(1); }), 1);
+  EXPECT_EQ(calls_in([&] { plain = std::make_unique<int>(1); }), 1);
   std::unique_ptr<Overaligned> aligned;
-  EXPECT_EQ(allocations_of([&] { aligned = std::make_unique<Overaligned>(); }), 1);
+  EXPECT_EQ(calls_in([&] { aligned = std::make_unique<Overaligned>(); }), 1);
   Eigen::VectorXd dynamic;
-  EXPECT_GE(allocations_of([&] { dynamic.setZero(5); }), 1);
+  EXPECT_GE(calls_in([&] { dynamic.setZero(5); }), 1);
 }
 
 TEST_F(Allocation, does_not_happen_in_10000_steps_of_any_law_whatever_the_input) {
@@ -111,7 +90,7 @@ TEST_F(Allocation, does_not_happen_in_10000_steps_of_any_law_whatever_the_input)
     for (const int joints : {1, 3, 7}) {
       Controller controller(Artifact::parse(json_twin(artifact_table(kind, joints)), "test"));
       std::uint32_t flags = 0;
-      const int count = allocations_of([&] {
+      const int count = calls_in([&] {
         for (int k = 0; k < 10000; ++k) {
           StepInput input;
           input.seq = k;
@@ -138,7 +117,7 @@ TEST_F(Allocation, does_not_happen_when_blocks_of_several_premises_keep_the_vert
   const Json& vertex = inertia["blocks"][0]["vertices"][0];
   inertia["blocks"] = {{{"kind", "box"}, {"premises", {0, 1}}, {"vertices", {vertex, vertex, vertex, vertex}}}};
   Controller controller(Artifact::parse(json_twin(table), "test"));
-  EXPECT_EQ(allocations_of([&] {
+  EXPECT_EQ(calls_in([&] {
               for (int k = 0; k < 10000; ++k) {
                 controller.step({});
               }
@@ -156,7 +135,7 @@ TEST_F(Allocation, does_not_happen_when_a_trajectory_is_evaluated) {
                       {"coefficients", Json::parse("[[[0,1,0,0,0,0]],[[1,1,0,0,0,0]]]")}};
   const Trajectory trajectory = Trajectory::parse(json_twin(table), "test");
   double sum = 0.0;
-  EXPECT_EQ(allocations_of([&] {
+  EXPECT_EQ(calls_in([&] {
               for (int k = 0; k < 10000; ++k) {
                 sum += trajectory.evaluate(3e-4 * k).angle[0];
               }
@@ -172,7 +151,7 @@ TEST_F(Allocation, does_not_happen_in_the_control_thread_of_any_law_whatever_the
       auto ring = std::make_unique<SampleRing>();  // nobody empties it
       loop.publish_to(ring.get());
       QuietRobot robot;
-      EXPECT_EQ(allocations_of([&] { run_control_thread(loop, robot, pace); }), 0) << kind;
+      EXPECT_EQ(calls_in([&] { run_control_thread(loop, robot, pace); }), 0) << kind;
       EXPECT_GT(ring->drops(), 0);
     }
   }

@@ -9,30 +9,22 @@
 #include <mutex>
 #include <shared_mutex>
 
+#include "counting.hpp"
 #include "quasilpv/telemetry_publisher.hpp"
 #include "quiet_robot.hpp"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define QUASILPV_COUNTS_LOCKS 0  // sanitizers bring their own
-#else
-#define QUASILPV_COUNTS_LOCKS 1
-#endif
-
 namespace {
-
-thread_local bool counting = false;
-thread_local int locks = 0;
 
 /// Counts a call and makes it: `name` as the C library, the next in the order of symbols, has it.
 template <class... Arguments>
 [[maybe_unused]] int count_and_call(const char* name, Arguments... arguments) {
-  locks += counting ? 1 : 0;
+  ::quasilpv::testing::count();
   return reinterpret_cast<int (*)(Arguments...)>(dlsym(RTLD_NEXT, name))(arguments...);
 }
 
 }  // namespace
 
-#if QUASILPV_COUNTS_LOCKS
+#if QUASILPV_COUNTS_CALLS
 extern "C" {
 int pthread_mutex_lock(pthread_mutex_t* mutex) noexcept { return count_and_call("pthread_mutex_lock", mutex); }
 int pthread_mutex_trylock(pthread_mutex_t* mutex) noexcept { return count_and_call("pthread_mutex_trylock", mutex); }
@@ -77,26 +69,17 @@ int sem_timedwait(sem_t* semaphore, const timespec* until) { return count_and_ca
 namespace quasilpv {
 namespace {
 
+using ::quasilpv::testing::calls_in;
 using ::quasilpv::testing::kLawKinds;
 using ::quasilpv::testing::kPaces;
 using ::quasilpv::testing::make_loop;
 using ::quasilpv::testing::QuietRobot;
 using ::quasilpv::testing::run_control_thread;
 
-/// Locks taken, tried, waited for or signalled by `action` in this thread.
-template <class Action>
-int locks_of(Action action) {
-  locks = 0;
-  counting = true;
-  action();
-  counting = false;
-  return locks;
-}
-
 class Lock : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (QUASILPV_COUNTS_LOCKS == 0) {
+    if (QUASILPV_COUNTS_CALLS == 0) {
       GTEST_SKIP() << "the sanitizer replaces the locks itself";
     }
   }
@@ -104,26 +87,26 @@ class Lock : public ::testing::Test {
 
 TEST_F(Lock, is_counted_for_mutexes_conditions_semaphores_and_spin_locks) {
   std::mutex mutex;
-  EXPECT_EQ(locks_of([&] { const std::lock_guard<std::mutex> lock(mutex); }), 1);
+  EXPECT_EQ(calls_in([&] { const std::lock_guard<std::mutex> lock(mutex); }), 1);
   std::timed_mutex timed;
-  EXPECT_EQ(locks_of([&] { timed.try_lock(); }), 1);
+  EXPECT_EQ(calls_in([&] { timed.try_lock(); }), 1);
   std::shared_mutex shared;
-  EXPECT_EQ(locks_of([&] { const std::shared_lock<std::shared_mutex> lock(shared); }), 1);
-  EXPECT_EQ(locks_of([&] { const std::unique_lock<std::shared_mutex> lock(shared); }), 1);
+  EXPECT_EQ(calls_in([&] { const std::shared_lock<std::shared_mutex> lock(shared); }), 1);
+  EXPECT_EQ(calls_in([&] { const std::unique_lock<std::shared_mutex> lock(shared); }), 1);
   std::condition_variable condition;
-  EXPECT_EQ(locks_of([&] { condition.notify_one(); }), 1);
-  EXPECT_EQ(locks_of([&] {
+  EXPECT_EQ(calls_in([&] { condition.notify_one(); }), 1);
+  EXPECT_EQ(calls_in([&] {
               std::unique_lock<std::mutex> lock(mutex);
               condition.wait_for(lock, std::chrono::nanoseconds(1));
             }),
             2);
   sem_t semaphore;
   sem_init(&semaphore, 0, 1);
-  EXPECT_EQ(locks_of([&] { sem_wait(&semaphore); }), 1);
+  EXPECT_EQ(calls_in([&] { sem_wait(&semaphore); }), 1);
   sem_destroy(&semaphore);
   pthread_spinlock_t spin;
   pthread_spin_init(&spin, PTHREAD_PROCESS_PRIVATE);
-  EXPECT_EQ(locks_of([&] { pthread_spin_lock(&spin); }), 1);
+  EXPECT_EQ(calls_in([&] { pthread_spin_lock(&spin); }), 1);
   pthread_spin_destroy(&spin);
 }
 
@@ -144,7 +127,7 @@ TEST_F(Lock, is_counted_for_every_command_of_a_driver_that_takes_one) {
   ControlLoop loop = make_loop("dob-acceleration");
   LockingRobot robot;
   ControllerRunReport report;
-  const int count = locks_of([&] { report = run_control_thread(loop, robot, Pace::kLockStep); });
+  const int count = calls_in([&] { report = run_control_thread(loop, robot, Pace::kLockStep); });
   EXPECT_EQ(count, report.commands);
   EXPECT_GT(count, 1000);
 }
@@ -157,7 +140,7 @@ TEST_F(Lock, is_not_taken_by_the_control_thread_of_any_law_whatever_the_robot_do
       loop.publish_to(&publisher.ring());
       QuietRobot robot;
       ControllerRunReport report;
-      EXPECT_EQ(locks_of([&] { report = run_control_thread(loop, robot, pace); }), 0) << kind;
+      EXPECT_EQ(calls_in([&] { report = run_control_thread(loop, robot, pace); }), 0) << kind;
       EXPECT_GT(loop.predicted_steps(), 0);
       EXPECT_GT(report.resets, 5);
     }
