@@ -49,9 +49,9 @@ TEST(TelemetryRing, when_two_threads_share_it_expect_every_element_whole_and_in_
   // A torn element would mix two numbers.
   using Block = std::array<std::int64_t, 32>;
   static constexpr std::int64_t kCount = 200'000;
-  static TelemetryRing<Block, 64> ring;
+  TelemetryRing<Block, 64> ring;
   std::int64_t attempts = 0;
-  std::thread producer([&attempts] {
+  std::thread producer([&attempts, &ring] {
     Block block;
     for (std::int64_t i = 0; i < kCount; ++i, ++attempts) {
       block.fill(i);
