@@ -36,8 +36,11 @@ SIZES: Mapping[str, Mapping[str, Any]] = {
 TOO_LARGE = {"II.7", "II.8"}
 """Triple sums: minutes a problem in cvxpy."""
 
-OTHERS = tuple(name for name in CONDITIONS if name not in TOO_LARGE | {"II.6"})
-REGULAR = {"II.6", "II.6-direct", "guerra-2007"}
+OF_THE_STATE = {"estimated-observer"}
+"""Asks for premises that are functions of the state, which those of a random system are not."""
+
+OTHERS = tuple(name for name in CONDITIONS if name not in TOO_LARGE | OF_THE_STATE | {"II.6"})
+REGULAR = {"II.6", "II.6-direct", "guerra-2007", "sampled-feedback", "sampled-observer"}
 
 
 @dataclass(frozen=True)
