@@ -9,8 +9,9 @@ import pytest
 import sympy as sp
 
 from closed_loops import decided, premises, reduced_loop, stated, worst_rate, worst_root
-from quasilpv.conditions.condition import Feedback, Form, Options, on_state
+from quasilpv.conditions.condition import Feedback, Form, Options
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, on_differential
+from quasilpv.conditions.gains import on_state
 from quasilpv.conditions.registry import CONDITIONS, condition
 from quasilpv.conditions.slack import Slack
 from quasilpv.errors import InputError

@@ -12,10 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.conditions.blocks import double_sum, single_sum
+from quasilpv.conditions.gains import DelayedFeedback, DescriptorGain, Gain, ObserverGain, PolytopicGain
 from quasilpv.conditions.slack import Slack
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.polytopes import PolytopicModel
+from quasilpv.polytopes.units import Units
 
 FloatArray = npt.NDArray[np.float64]
 Values: TypeAlias = Mapping[Variable, FloatArray]
@@ -68,33 +70,30 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Feedback:
-    """What a solution gives: a Lyapunov function and, for a design condition, a control law.
+    """What a solution gives: a Lyapunov function and, for a design condition, a control law, as data (`gains`).
 
     Attributes:
         lyapunov: P with ``V = x_d' P^-1 x_d`` on the differential states, (q, q).
-        gain: ``z -> K(z)``, (m, n) for ``u = K(z) x``, or (m, n + q) for ``u = K(z) (x_d, x_d', x_a)``; None for an
-            analysis condition.
-        observer: ``z -> L(z)``, (n, outputs), of an observer condition, whose V is one of the estimation error.
+        gain: K(z), (m, n) for ``u = K(z) x``, or (m, n + q) for ``u = K(z) (x_d, x_d', x_a)``; None for an analysis
+            condition.
+        observer: L(z), (n, outputs), of an observer condition, whose V is one of the estimation error.
         delayed: the law with memory that was designed, if it has one; `gain` is then the law without that follows.
     """
 
     lyapunov: FloatArray
-    gain: Callable[[FloatArray], FloatArray] | None
+    gain: Gain | None
     delayed: DelayedFeedback | None = None
-    observer: Callable[[FloatArray], FloatArray] | None = None
+    observer: ObserverGain | None = None
 
-
-@dataclass(frozen=True, eq=False)
-class DelayedFeedback:
-    """A law with memory: it knows the mean of the weights over the last tau seconds, and those tau seconds ago.
-
-    Attributes:
-        lyapunov: from the mean weights (N,) to P with ``V = x_d' P^-1 x_d``.
-        gain: from z now, the mean weights and z tau seconds ago to K with ``u = K x``.
-    """
-
-    lyapunov: Callable[[FloatArray], FloatArray]
-    gain: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+    def in_old_units(self, units: Units) -> Feedback:
+        """The same for the system whose description in other units this one is for, exactly: ``P = T P^ T``."""
+        T = units.T_differential
+        return Feedback(
+            T[:, None] * self.lyapunov * T,
+            self.gain and self.gain.in_old_units(units),
+            self.delayed and self.delayed.in_old_units(units),
+            self.observer and self.observer.in_old_units(units),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,8 +160,8 @@ def shared_gains(model: PolytopicModel, columns: int, name: str = "F") -> tuple[
 
 def polytopic_gain(
     model: PolytopicModel, F: Sequence[Variable], values: Values, right: FloatArray
-) -> Callable[[FloatArray], FloatArray] | None:
-    """``z -> sum_i w_i(z) F_i right``, or None for a system without inputs.
+) -> PolytopicGain | None:
+    """``K(z) = sum_i w_i(z) F_i right``, or None for a system without inputs.
 
     Args:
         model: the system.
@@ -172,14 +171,7 @@ def polytopic_gain(
     """
     if model.inputs == 0:
         return None
-    vertices = np.stack([values[Fi] for Fi in F]) @ right
-    return lambda z: np.asarray(model.polytope.evaluate(vertices, z))
-
-
-def on_state(lyapunov: FloatArray, order: int) -> FloatArray:
-    """``[P^-1 0]``, (q, n): what a gain on ``P^-1 x_d`` is multiplied with to act on x."""
-    inverse = np.linalg.inv(lyapunov)
-    return np.hstack([inverse, np.zeros((len(inverse), order - len(inverse)))])
+    return PolytopicGain(model.polytope, np.stack([values[Fi] for Fi in F]) @ right)
 
 
 def is_single_sum(model: PolytopicModel, slack: Slack) -> bool:
@@ -256,9 +248,4 @@ def descriptor_feedback(model: PolytopicModel, P: Variable, F: Sequence[Variable
 
 def descriptor_law(model: PolytopicModel, lyapunov: FloatArray, gains: FloatArray) -> Feedback:
     """The law ``u = F(z) E(z)^-T P^-1 x``, P (n, n) and vertices of F (count, m, n)."""
-    inverse = np.linalg.inv(lyapunov)
-
-    def gain(z: FloatArray) -> FloatArray:
-        return np.asarray(model.polytope.evaluate(gains, z) @ np.linalg.solve(model.system.E.evaluate(z).T, inverse))
-
-    return Feedback(lyapunov, gain if model.inputs else None)
+    return Feedback(lyapunov, DescriptorGain(model.polytope, gains, model.system.E, lyapunov) if model.inputs else None)

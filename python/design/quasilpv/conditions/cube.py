@@ -74,7 +74,7 @@ def cube_with_gains(
     right: Expression,
     lift: ExactMatrix | None = None,
     offset: Expression | None = None,
-) -> Callable[[Values], Callable[[FloatArray], FloatArray]]:
+) -> Callable[[Values], FloatArray]:
     """Require ``He(T ((A_e + alpha E_o) Y + B_e [M(z) 0]) + C) < 0`` with gains affine in the premises, B constant.
 
     Vertex gains M_i of a representation with one block per premise are ``M_c + sum_p d_p M_p`` up to a part of mean
@@ -89,7 +89,7 @@ def cube_with_gains(
         offset: C, w x w; None for zero.
 
     Returns:
-        From a solution to ``z -> M(z)``, (m, q).
+        From a solution to the vertex gains M_i, (N, m, q).
     """
     q, m = model.differential, model.inputs
     centre, slopes = model.spread(lambda E, A, B: extended_state(E, A, q, decay_rate))
@@ -108,17 +108,11 @@ def cube_with_gains(
     total = T @ (centre @ right + B @ padded(at_centre))
     cube_sum(problem, name, total if offset is None else total + offset, terms)
 
-    def gains(values: Values) -> Callable[[FloatArray], FloatArray]:
-        def gain(z: FloatArray) -> FloatArray:
-            d = _normalised(model, z)
-            return np.asarray(values[at_centre] + sum(d[p] * values[Mp] for p, Mp in M.items()))
-
-        return gain
+    def gains(values: Values) -> FloatArray:
+        low, high = model.polytope.lower, model.polytope.upper
+        slopes = np.zeros((model.polytope.premises, m, q))
+        for p, Mp in M.items():
+            slopes[p] = 2.0 * values[Mp] / (high - low)[p]
+        return model.polytope.vertices(values[at_centre] - np.tensordot(0.5 * (low + high), slopes, axes=1), slopes)
 
     return gains
-
-
-def _normalised(model: PolytopicModel, z: FloatArray) -> FloatArray:
-    """The d_p of a premise vector z, (r,)."""
-    low, high = model.polytope.lower, model.polytope.upper
-    return np.asarray((2.0 * z - low - high) / (high - low))

@@ -19,12 +19,13 @@ with ``gain(z, varpi*, z)``. A system that no such law stabilises quadratically 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from fractions import Fraction
 
 import numpy as np
 
-from quasilpv.conditions.condition import DelayedFeedback, Feedback, FloatArray, Options, Values
+from quasilpv.conditions.condition import Feedback, Options, Values
+from quasilpv.conditions.gains import DelayedFeedback, MemorylessGain
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.expressions import as_expression
@@ -64,13 +65,6 @@ class MovingLyapunov:
         """``D_i / 2``: half of dP/dt is ``sum_im w_i w_m (D_i - D_m) / 2``, and He doubles it."""
         return as_expression(self.D[i] * Fraction(1, 2))
 
-    def value(self, values: Values, varpi: FloatArray) -> FloatArray:
-        """``P(varpi)`` of a solution."""
-        if self.window_s is None:
-            return values[self.P]
-        moved = sum(weight * values[D] for weight, D in zip(varpi, self.D, strict=True))
-        return np.asarray(values[self.P] + self.window_s * moved)
-
 
 def require_delayed(model: PolytopicModel, options: Options, condition: str) -> None:
     """Refuse what a law with memory cannot take.
@@ -93,7 +87,8 @@ def delayed_feedback(
     lyapunov: MovingLyapunov,
     values: Values,
     gains: Mapping[tuple[int, ...], Variable],
-    right: Callable[[FloatArray, FloatArray], FloatArray],
+    *,
+    descriptor: bool,
 ) -> Feedback:
     """The laws of a solution: with memory for a window tau, and without.
 
@@ -101,7 +96,7 @@ def delayed_feedback(
         model: the system.
         lyapunov, values: the solution.
         gains: F by the indices of w(z), of varpi if there is a window, and of w(z_d).
-        right: from z and P(varpi) to what F is multiplied with.
+        descriptor: whether F is multiplied with ``E(z)^-T P(varpi)^-1``, else with ``[P(varpi)^-1 0]``.
 
     Returns:
         The memoryless law ``gain(z, varpi*, z)`` with equal mean weights varpi*, its Lyapunov matrix P(varpi*), and,
@@ -110,20 +105,17 @@ def delayed_feedback(
     count = model.vertex_count
     shape = next(iter(gains.values()))
     indices = len(next(iter(gains)))
-    vertices = np.stack([values[F] for F in gains.values()]).reshape(*(count,) * indices, shape.rows, shape.cols)
-    weights = model.polytope.weights
-
-    def gain(z: FloatArray, varpi: FloatArray, z_delayed: FloatArray) -> FloatArray:
-        window = [varpi] * lyapunov.window_indices
-        F = vertices
-        for own in (weights(z), *window, weights(z_delayed)):
-            F = np.tensordot(own, F, axes=1)
-        return np.asarray(F @ right(z, lyapunov.value(values, varpi)))
-
-    equal = np.full(count, 1.0 / count)
-    delayed = DelayedFeedback(lambda varpi: lyapunov.value(values, varpi), gain)
+    delayed = DelayedFeedback(
+        polytope=model.polytope,
+        vertices=np.stack([values[F] for F in gains.values()]).reshape(*(count,) * indices, shape.rows, shape.cols),
+        constant=values[lyapunov.P],
+        moving=np.stack([values[D] for D in lyapunov.D]),
+        window_s=lyapunov.window_s,
+        E=model.system.E if descriptor else None,
+        order=model.order,
+    )
     return Feedback(
-        lyapunov.value(values, equal),
-        (lambda z: gain(z, equal, z)) if model.inputs else None,
+        delayed.lyapunov(np.full(count, 1.0 / count)),
+        MemorylessGain(delayed) if model.inputs else None,
         delayed if model.inputs and lyapunov.window_indices else None,
     )

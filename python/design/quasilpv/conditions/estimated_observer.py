@@ -35,13 +35,13 @@ import sympy as sp
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
-    FloatArray,
     Options,
     Statement,
     Values,
     require_regular,
     vertex_sum,
 )
+from quasilpv.conditions.gains import ObserverGain
 from quasilpv.conditions.mismatch import Form, Mismatch, bounded_jacobian
 from quasilpv.conditions.sampled_observer import MULTIPLIER_SAMPLES
 from quasilpv.errors import InputError
@@ -118,12 +118,8 @@ def statement(
 
     def feedback(values: Values) -> Feedback:
         H_vertices, Y_vertices = (np.stack([values[X] for X in unknowns]) for unknowns in (H, Y))
-
-        def observer(z: FloatArray) -> FloatArray:
-            known = np.asarray(z) if places is None else np.asarray(z)[list(places)]
-            H_z, Y_z = (own.polytope.evaluate(vertices, known) for vertices in (H_vertices, Y_vertices))
-            return np.asarray(options.sample_period_s * np.linalg.solve(H_z.T, Y_z))
-
+        kept = None if places is None else tuple(places)
+        observer = ObserverGain(own.polytope, H_vertices, Y_vertices, options.sample_period_s, kept)
         return Feedback(np.asarray(np.linalg.inv(values[Q])), None, observer=observer)
 
     return Statement(problem, feedback, slacks)

@@ -16,7 +16,8 @@ from fractions import Fraction
 import numpy as np
 
 from quasilpv.conditions.blocks import double_sum
-from quasilpv.conditions.condition import Condition, Feedback, FloatArray, Options, Statement, Values, require_regular
+from quasilpv.conditions.condition import Condition, Feedback, Options, Statement, Values, require_regular
+from quasilpv.conditions.gains import TwoSetsGain
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable, block
 from quasilpv.polytopes import PolytopicModel
@@ -61,10 +62,7 @@ def build(model: PolytopicModel, options: Options) -> Statement:
             model.premises_of(lambda E, A, B: E),
         )
         h, v = model.polytope.restricted(of_right), model.polytope.restricted(of_left)
-
-        def gain(z: FloatArray) -> FloatArray:
-            return np.asarray(np.einsum("j,k,jkmn->mn", h.weights(z[of_right]), v.weights(z[of_left]), vertices))
-
+        gain = TwoSetsGain(h, v, (tuple(of_right), tuple(of_left)), vertices)
         return Feedback(values[P1], gain if m else None)
 
     return Statement(problem, feedback)

@@ -18,8 +18,6 @@ Every step is an equivalence. Larger slack families are not reduced: they prove 
 
 from __future__ import annotations
 
-import numpy as np
-
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
@@ -29,7 +27,6 @@ from quasilpv.conditions.condition import (
     Statement,
     Values,
     is_single_sum,
-    on_state,
     polytopic_gain,
     shared_gains,
     vertex_sum,
@@ -43,6 +40,7 @@ from quasilpv.conditions.extended import (
     extended_states_in_double,
     on_differential,
 )
+from quasilpv.conditions.gains import PolytopicGain, on_state
 from quasilpv.conditions.slack import Slack
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.expressions import as_expression
@@ -117,7 +115,7 @@ def without_gains(model: PolytopicModel, options: Options) -> Statement:
         extended = extended_states_in_double(model, options.decay_rate)
         M = gains_on_differential(extended, model.system.B.constant, P.value(values), q)
         vertices = M @ on_state(values[P.P11], model.order)
-        return Feedback(values[P.P11], lambda z: np.asarray(model.polytope.evaluate(vertices, z)))
+        return Feedback(values[P.P11], PolytopicGain(model.polytope, vertices))
 
     return Statement(problem, feedback)
 
@@ -130,8 +128,8 @@ def _as_cube(model: PolytopicModel, options: Options) -> Statement:
     gains = cube_with_gains(problem, "Upsilon", model, decay_rate=options.decay_rate, right=P.matrix)
 
     def feedback(values: Values) -> Feedback:
-        M, right = gains(values), on_state(values[P.P11], model.order)
-        return Feedback(values[P.P11], (lambda z: M(z) @ right) if model.inputs else None)
+        right = on_state(values[P.P11], model.order)
+        return Feedback(values[P.P11], PolytopicGain(model.polytope, gains(values) @ right) if model.inputs else None)
 
     return Statement(problem, feedback)
 

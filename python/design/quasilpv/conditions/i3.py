@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from quasilpv.conditions.blocks import double_sum
-from quasilpv.conditions.condition import Condition, Feedback, FloatArray, Options, Statement, Values, on_state
+from quasilpv.conditions.condition import Condition, Feedback, Options, Statement, Values
 from quasilpv.conditions.extended import (
     extended_input,
     extended_inputs,
@@ -23,6 +23,7 @@ from quasilpv.conditions.extended import (
     extended_states,
     on_differential,
 )
+from quasilpv.conditions.gains import PolytopicGain, on_state
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable, block, he, identity, to_rational, zeros
 from quasilpv.polytopes import PolytopicModel
@@ -65,10 +66,7 @@ def build(model: PolytopicModel, options: Options) -> Statement:
 
     def feedback(values: Values) -> Feedback:
         vertices = np.stack([values[Mj] for Mj in M]) @ on_state(values[P11], n)
-
-        def gain(z: FloatArray) -> FloatArray:
-            return np.asarray(nominal.polytope.evaluate(vertices, z[known]))
-
+        gain = PolytopicGain(nominal.polytope, vertices, tuple(known))
         return Feedback(values[P11], gain if nominal.inputs else None)
 
     return Statement(problem, feedback, slacks)

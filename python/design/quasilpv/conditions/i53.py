@@ -26,6 +26,7 @@ from quasilpv.conditions.condition import (
 )
 from quasilpv.conditions.elimination import completed, gains_are_free, gains_on_extended, unactuated_rows
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, extended_states_in_double
+from quasilpv.conditions.gains import PolytopicGain
 from quasilpv.conditions.slack import Slack
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.expressions import as_expression
@@ -71,7 +72,7 @@ def _recovered(model: PolytopicModel, options: Options, lyapunov: FloatArray, P:
     whole = completed(P, model)
     M = gains_on_extended(extended, extended_inputs(model)[0].astype(float), whole)
     K = M @ np.linalg.inv(whole)
-    return Feedback(lyapunov, lambda z: np.asarray(model.polytope.evaluate(K, z)))
+    return Feedback(lyapunov, PolytopicGain(model.polytope, K))
 
 
 CONDITION = Condition(

@@ -36,7 +36,6 @@ from quasilpv.conditions.condition import (
     Statement,
     Values,
     is_single_sum,
-    on_state,
     polytopic_gain,
     shared_gains,
     vertex_sum,
@@ -44,6 +43,7 @@ from quasilpv.conditions.condition import (
 from quasilpv.conditions.cube import cube_with_gains, is_cube
 from quasilpv.conditions.elimination import gains_are_free
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, on_differential
+from quasilpv.conditions.gains import PolytopicGain, on_state
 from quasilpv.conditions.slack import Slack
 from quasilpv.lmi import Expression, Problem, Variable, block, zeros
 from quasilpv.polytopes import PolytopicModel
@@ -118,9 +118,9 @@ def _as_cube(model: PolytopicModel, options: Options, problem: Problem, V: Expre
     )
 
     def feedback(values: Values) -> Feedback:
-        lyapunov, F = V.at(values).astype(float), gains(values)
-        right = on_state(lyapunov, model.order)
-        return Feedback(lyapunov, (lambda z: F(z) @ right) if model.inputs else None)
+        lyapunov = V.at(values).astype(float)
+        vertices = gains(values) @ on_state(lyapunov, model.order)
+        return Feedback(lyapunov, PolytopicGain(model.polytope, vertices) if model.inputs else None)
 
     return Statement(problem, feedback)
 

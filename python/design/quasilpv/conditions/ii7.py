@@ -15,7 +15,7 @@ from __future__ import annotations
 from itertools import product
 
 from quasilpv.conditions.blocks import double_sum
-from quasilpv.conditions.condition import Condition, Feedback, FloatArray, Options, Statement, Values, on_state
+from quasilpv.conditions.condition import Condition, Feedback, Options, Statement, Values
 from quasilpv.conditions.delayed import MovingLyapunov, delayed_feedback, require_delayed
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, on_differential
 from quasilpv.lmi import Expression, Problem, Variable, block, zeros
@@ -51,11 +51,8 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     others = 1 + V.window_indices
     slacks = double_sum(problem, "Xi", entry, count, model.polytope.block_index, slack=options.slack, others=others)
 
-    def right(_: FloatArray, lyapunov: FloatArray) -> FloatArray:
-        return on_state(lyapunov, n)
-
     def feedback(values: Values) -> Feedback:
-        return delayed_feedback(model, V, values, F, right)
+        return delayed_feedback(model, V, values, F, descriptor=False)
 
     return Statement(problem, feedback, slacks)
 

@@ -13,13 +13,10 @@ from __future__ import annotations
 from functools import cache
 from itertools import product
 
-import numpy as np
-
 from quasilpv.conditions.blocks import double_sum
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
-    FloatArray,
     Options,
     Statement,
     Values,
@@ -64,11 +61,8 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     others = 2 + P.window_indices
     slacks = double_sum(problem, "Pi", entry, count, model.polytope.block_index, slack=options.slack, others=others)
 
-    def right(z: FloatArray, lyapunov: FloatArray) -> FloatArray:
-        return np.asarray(np.linalg.solve(model.system.E.evaluate(z).T, np.linalg.inv(lyapunov)))
-
     def feedback(values: Values) -> Feedback:
-        return delayed_feedback(model, P, values, F, right)
+        return delayed_feedback(model, P, values, F, descriptor=True)
 
     return Statement(problem, feedback, slacks)
 

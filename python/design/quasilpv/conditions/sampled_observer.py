@@ -22,7 +22,8 @@ from math import exp
 import numpy as np
 
 from quasilpv.conditions.blocks import double_sum
-from quasilpv.conditions.condition import Condition, Feedback, FloatArray, Options, Statement, Values, require_regular
+from quasilpv.conditions.condition import Condition, Feedback, Options, Statement, Values, require_regular
+from quasilpv.conditions.gains import ObserverGain
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable, block, he, to_rational
 from quasilpv.polytopes import PolytopicModel
@@ -64,11 +65,7 @@ def build(model: PolytopicModel, options: Options) -> Statement:
 
     def feedback(values: Values) -> Feedback:
         H_vertices, Y_vertices = (np.stack([values[X] for X in unknowns]) for unknowns in (H, Y))
-
-        def observer(z: FloatArray) -> FloatArray:
-            H_z, Y_z = (model.polytope.evaluate(vertices, z) for vertices in (H_vertices, Y_vertices))
-            return np.asarray(options.sample_period_s * np.linalg.solve(H_z.T, Y_z))
-
+        observer = ObserverGain(model.polytope, H_vertices, Y_vertices, options.sample_period_s)
         return Feedback(np.asarray(np.linalg.inv(values[Q])), None, observer=observer)
 
     return Statement(problem, feedback, slacks)

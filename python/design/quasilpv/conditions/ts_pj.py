@@ -16,11 +16,11 @@ from quasilpv.conditions.condition import (
     Options,
     Statement,
     Values,
-    on_state,
     polytopic_gain,
     shared_gains,
 )
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, on_differential
+from quasilpv.conditions.gains import on_state
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.expressions import as_expression
 from quasilpv.polytopes import PolytopicModel
