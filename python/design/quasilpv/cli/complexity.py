@@ -11,6 +11,7 @@ from quasilpv.cli.parameters import CommonOption, RepresentationOption, SetOptio
 from quasilpv.conditions.blocks import Slack
 from quasilpv.conditions.condition import Options
 from quasilpv.studies import count
+from quasilpv.systems.catalogue import system_kind
 
 COLUMNS = ("vertices", "unknowns", "slack_unknowns", "inequalities", "rows", "entries")
 
@@ -45,4 +46,4 @@ def complexity_command(
         return
     rows = [(name, shape, *(str(sizes[column]) for column in COLUMNS)) for name, shape, sizes in found]
     headings = ("condition", "representation", *(column.replace("_", "\n") for column in COLUMNS))
-    print_table(system, headings, rows, left_columns=2)
+    print_table(system_kind(system).stem, headings, rows, left_columns=2)

@@ -6,10 +6,11 @@ from typing import Any
 
 from quasilpv.cli.console import JsonOption, print_json, print_table
 from quasilpv.conditions.registry import CONDITIONS
+from quasilpv.errors import InputError
 from quasilpv.reproduction import ITEMS
 from quasilpv.scenarios import tracking_tasks
 from quasilpv.synthesis import CONTROLLERS
-from quasilpv.systems.catalogue import SYSTEMS
+from quasilpv.systems.catalogue import system_kind, system_names
 from quasilpv.systems.registry import robots
 
 
@@ -24,9 +25,7 @@ def listing_command(json: JsonOption = False) -> None:
         "robots": [{"id": robot.id, "summary": robot.summary} for robot in robots()],
         "controllers": [{"id": name, "summary": kind.summary} for name, kind in CONTROLLERS.items()],
         "scenarios": [{"id": task.id, "summary": task.summary, "robot": task.robot} for task in tracking_tasks()],
-        "systems": [
-            {"id": name, "summary": kind.summary, "parameters": list(kind.parameters)} for name, kind in SYSTEMS.items()
-        ],
+        "systems": [_system(name) for name in system_names()],
         "conditions": [{"id": name, "summary": entry.summary} for name, entry in CONDITIONS.items()],
         "items": [{"id": name, "summary": entry.title} for name, entry in ITEMS.items()],
     }
@@ -35,3 +34,12 @@ def listing_command(json: JsonOption = False) -> None:
         return
     for kind, entries in known.items():
         print_table(kind, ("", ""), [(f"  {entry['id']}", entry["summary"]) for entry in entries], left_columns=2)
+
+
+def _system(name: str) -> dict[str, Any]:
+    """A system; of one whose package cannot be loaded, why."""
+    try:
+        kind = system_kind(name)
+    except InputError as error:
+        return {"id": name, "summary": f"cannot be loaded: {error}", "parameters": []}
+    return {"id": name, "summary": kind.summary, "parameters": list(kind.parameters)}

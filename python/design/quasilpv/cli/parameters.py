@@ -19,7 +19,14 @@ from quasilpv.studies.region import Axis
 
 Result = TypeVar("Result")
 
-SystemArgument: TypeAlias = Annotated[str, typer.Argument(metavar="SYSTEM", help="A system of design list.")]
+SystemArgument: TypeAlias = Annotated[
+    str,
+    typer.Argument(
+        metavar="SYSTEM",
+        help="A system of design list, or FILE.py:NAME, a system or a function of parameters with defaults in a file of"
+        " your own. FILE.py:NAME executes the code in FILE.py; nothing else does.",
+    ),
+]
 ConditionOption: TypeAlias = Annotated[str, typer.Option("--condition", "-c", help="A condition of design list.")]
 RepresentationOption: TypeAlias = Annotated[
     str,

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, style
 from quasilpv.studies.question import Question, Verdict
 from quasilpv.studies.region import Region
+from quasilpv.systems.catalogue import system_kind
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, BLACK)
@@ -106,6 +107,6 @@ def _frame(axes: Axes, region: Region) -> None:
 
 def _title(question: Question) -> str:
     fixed = ", ".join(f"{name} = {value:g}" for name, value in question.parameters)
-    return f"{question.system}: condition {question.condition}, {question.representation}" + (
+    return f"{system_kind(question.system).stem}: condition {question.condition}, {question.representation}" + (
         f", {fixed}" if fixed else ""
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 from quasilpv.errors import InputError
 from quasilpv.studies.question import Answer, Question, Sweep, Verdict
-from quasilpv.systems.catalogue import SYSTEMS
+from quasilpv.systems.catalogue import system_kind
 
 RELATIVE_TOLERANCE = 1e-3
 
@@ -74,8 +74,9 @@ def find_boundary(question: Question, over: Interval, tolerance: float = RELATIV
     """
     if not 0.0 < tolerance < 1.0:
         raise InputError("boundary", "tolerance", tolerance, "a number between 0 and 1")
-    if over.name not in SYSTEMS[question.system].parameters or over.start == over.end:
-        known = ", ".join(SYSTEMS[question.system].parameters)
+    parameters = system_kind(question.system).parameters
+    if over.name not in parameters or over.start == over.end:
+        known = ", ".join(parameters)
         got = f"{over.name}={over.start:g}:{over.end:g}"
         raise InputError("boundary", "over", got, f"a range of one of {known}")
     sweep = Sweep(question, (over.name,))

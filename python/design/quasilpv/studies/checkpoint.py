@@ -11,6 +11,7 @@ from typing import Any
 from quasilpv.errors import InputError
 from quasilpv.studies.question import Answer, Question, Verdict
 from quasilpv.studies.region import Axis
+from quasilpv.systems.catalogue import system_kind
 
 
 class Forgetful:
@@ -39,7 +40,7 @@ class Checkpoint:
     def __init__(self, folder: Path, question: Question, swept: tuple[str, str]) -> None:
         """Read what is there."""
         identity = _digest([question.to_document(), swept], 16)
-        self.path = folder / f"{question.system}-{question.condition}-{identity}.jsonl"
+        self.path = folder / f"{system_kind(question.system).stem}-{question.condition}-{identity}.jsonl"
         self._known: dict[tuple[float, float], Answer] = {}
         try:
             folder.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,7 @@ from quasilpv.lmi import Outcome, largest_margin
 from quasilpv.lmi.compiled import CompiledFamily, CompiledProblem, compile_family
 from quasilpv.lmi.feasibility import decide
 from quasilpv.polytopes import PolytopicModel, polytopic_model
-from quasilpv.systems.catalogue import SYSTEMS, system
+from quasilpv.systems.catalogue import system_kind
 
 MARGIN_PROGRAM_SIZE = 300_000
 """Rows times unknowns; larger problems are not put to the margin program: it would take minutes."""
@@ -31,10 +31,10 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Question:
-    """A condition for a system of the catalogue.
+    """A condition for a system that has a name.
 
     Attributes:
-        system: its id.
+        system: its id, see `quasilpv.systems.catalogue.system_kind`; a relative path becomes an absolute one.
         condition: its id.
         representation: its name, see `quasilpv.polytopes.polytopic_model`; empty for the one the condition was
             published with.
@@ -57,7 +57,9 @@ class Question:
             object.__setattr__(self, "representation", condition(self.condition).representation)
         object.__setattr__(self, "parameters", tuple(sorted(dict(self.parameters).items())))
         condition(self.condition)
-        system(self.system, **dict(self.parameters))
+        kind = system_kind(self.system)
+        object.__setattr__(self, "system", kind.id)
+        kind.system(**dict(self.parameters))
 
     def at(self, point: Mapping[str, float]) -> Question:
         """The same question with some parameters set."""
@@ -73,12 +75,14 @@ class Question:
 
     def model(self) -> PolytopicModel:
         """The system in its representation. Errors as `statement`."""
-        return polytopic_model(system(self.system, **dict(self.parameters)), self.representation)
+        return polytopic_model(system_kind(self.system).system(**dict(self.parameters)), self.representation)
 
     def to_document(self) -> dict[str, Any]:
-        """JSON-able."""
+        """JSON-able; a fingerprint tells two contents of one file of a user apart."""
+        fingerprint = system_kind(self.system).fingerprint
         return {
             "system": self.system,
+            **({"system_fingerprint": fingerprint} if fingerprint else {}),
             "condition": self.condition,
             "representation": self.representation,
             "parameters": dict(self.parameters),
@@ -157,7 +161,7 @@ class Sweep:
         return CompiledProblem.of(self.question.at(point).statement().problem)
 
     def _compile(self) -> CompiledFamily | None:
-        parameters = SYSTEMS[self.question.system].parameters
+        parameters = system_kind(self.question.system).parameters
         if not self.swept or not all(parameters[name].affine for name in self.swept):
             return None
         base = {name: dict(self.question.parameters).get(name, parameters[name].default) for name in self.swept}

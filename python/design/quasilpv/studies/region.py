@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from quasilpv.errors import InputError
 from quasilpv.studies.question import Answer, Question, Sweep, Verdict
-from quasilpv.systems.catalogue import SYSTEMS
+from quasilpv.systems.catalogue import system_kind
 
 Node: TypeAlias = tuple[int, int]
 """Column and row of a point of the grid."""
@@ -184,7 +184,7 @@ class Map:
         progress: Callable[[int, int], None],
     ) -> None:
         """Check the axes; nothing is solved yet."""
-        known = SYSTEMS[question.system].parameters
+        known = system_kind(question.system).parameters
         for axis in (x, y):
             if axis.name not in known:
                 raise InputError("region", "axis", axis.name, f"one of {', '.join(known)}")

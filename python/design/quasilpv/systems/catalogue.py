@@ -1,6 +1,7 @@
-"""The descriptor systems known by name: the examples of Dehak 2022 and the arms as stabilisation problems.
+"""The descriptor systems known by name: the examples of Dehak 2022, the arms as stabilisation problems, a user's own.
 
-A new system is one builder in a file of its family and one line here.
+A new system of the catalogue is one builder in a file of its family and one line here. A system of a user needs no
+change here: `system_kind` also takes a name in a Python file and the entry points of installed packages.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from quasilpv.systems.regular_example import regular_example
 from quasilpv.systems.singular_examples import rotation_example, singular_example, uncertain_example
 from quasilpv.systems.spring_disc import spring_disc
 from quasilpv.systems.system_kind import SystemKind
+from quasilpv.systems.user_code import entry_point_kind, entry_point_kinds, is_python_reference, python_file_kind
 
 _KINDS = (
     regular_example("ex-I.1"),
@@ -34,13 +36,44 @@ _KINDS = (
 SYSTEMS: Mapping[str, SystemKind] = MappingProxyType({kind.id: kind for kind in _KINDS})
 
 
+def system_kind(reference: str) -> SystemKind:
+    """The system, or the family of systems, that a reference names.
+
+    Every place that takes a system by name goes through here.
+
+    | reference | stands for |
+    |---|---|
+    | ``ex-I.1`` | an entry of the catalogue |
+    | another name | an entry point of the group `ENTRY_POINT_GROUP` of an installed package |
+    | ``FILE.py:NAME`` | a system, or a function of parameters with defaults, in a Python file, which is executed |
+
+    Returns:
+        A kind whose `id` any process of this machine can resolve again: paths are absolute.
+
+    Raises:
+        InputError: there is no such system (those there are are listed), or the user's code fails.
+    """
+    if reference in SYSTEMS:
+        return SYSTEMS[reference]
+    if is_python_reference(reference):
+        return python_file_kind(reference)
+    installed = entry_point_kinds()
+    if reference in installed:
+        return entry_point_kind(installed[reference])
+    names = one_of(system_names(), reference)
+    raise InputError("systems", "system", reference, f"FILE.py:NAME, or {names}")
+
+
+def system_names() -> list[str]:
+    """The references that are plain names: the catalogue, then the entry points of installed packages, not loaded."""
+    return [*SYSTEMS, *(name for name in entry_point_kinds() if name not in SYSTEMS)]
+
+
 def system(name: str, **parameters: float) -> DescriptorSystem:
-    """The descriptor system of that name, at the given parameters.
+    """The descriptor system that a reference names (see `system_kind`), at the given parameters.
 
     Raises:
         InputError: no such system or parameter (those there are are listed), or a value that is not finite or has no
             meaning.
     """
-    if name not in SYSTEMS:
-        raise InputError("systems", "system", name, one_of(SYSTEMS, name))
-    return SYSTEMS[name].system(**parameters)
+    return system_kind(name).system(**parameters)

@@ -38,6 +38,9 @@ class SystemKind:
         reference: where it comes from.
         parameters: its parameters by name.
         build: makes the system; called with every parameter by name.
+        stem: the id as a part of a file name; the id itself if it is not given.
+        fingerprint: changes with what the system is made from, if that may change (a user's file); empty for the
+            catalogue. Results kept for later hold it.
     """
 
     id: str
@@ -45,6 +48,13 @@ class SystemKind:
     reference: str
     parameters: Mapping[str, Parameter]
     build: Callable[..., DescriptorSystem]
+    stem: str = ""
+    fingerprint: str = ""
+
+    def __post_init__(self) -> None:
+        """Take the id for a file name if no other is given."""
+        if not self.stem:
+            object.__setattr__(self, "stem", self.id)
 
     def system(self, **parameters: float) -> DescriptorSystem:
         """The system at the given parameters, defaults for the others.
