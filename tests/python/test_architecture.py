@@ -14,6 +14,7 @@ PACKAGE = ROOT / "python" / "design" / "quasilpv"
 # Every room of the package, lowest layer first. A room imports itself and the layers below its own.
 LAYERS = (
     {"", "errors"},
+    {"files"},
     {"systems"},
     {"polytopes"},
     {"loops"},

@@ -15,7 +15,7 @@ from bench_compare import changes, read_results
 from bench_pinocchio import rnea_program
 from bench_report import HEADER, KEPT, Report, circumstances, exit_code_of, factor, print_cells
 
-from quasilpv.artifact.files import write_atomically
+from quasilpv.files import write_atomically
 
 LAYERS = ("model", "lmi", "certificate", "step", "premises", "plant", "transport", "latency", "soak", "footprint")
 

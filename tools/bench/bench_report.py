@@ -19,8 +19,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from quasilpv.artifact.files import write_atomically
 from quasilpv.errors import QuasilpvError
+from quasilpv.files import write_atomically
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = ROOT / "out" / "bench"

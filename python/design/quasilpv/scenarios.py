@@ -18,10 +18,10 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from quasilpv.artifact.canonical import MAX_SAFE_INTEGER, Document, member_path, normalise, parse_strict_json
-from quasilpv.artifact.files import read_bytes, write_readable_json
 from quasilpv.artifact.programs import MAX_JOINTS
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError, one_of
+from quasilpv.files import read_bytes, write_readable_json
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.systems.registry import Robot
 from quasilpv.trajectories import Trajectory, fivebar_spiral, rest, serial_circle, serial_square

@@ -19,8 +19,8 @@ from typing import Any, NoReturn
 import cbor2
 import rfc8785
 
-from quasilpv.artifact.files import MAX_FILE_BYTES
 from quasilpv.errors import InputError
+from quasilpv.files import MAX_FILE_BYTES
 
 MAX_DEPTH = 32
 MAX_SAFE_INTEGER = 2**53 - 1

@@ -9,8 +9,8 @@ from typing import Any
 
 from quasilpv.artifact.canonical import canonical_cbor, canonical_json, member_path, parse_document
 from quasilpv.artifact.envelope import envelope_summary
-from quasilpv.artifact.files import read_bytes, write_atomically
 from quasilpv.artifact.schema import Artifact
+from quasilpv.files import read_bytes, write_atomically
 
 JSON_NAME = "artifact.json"
 CBOR_NAME = "artifact.cbor"

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
+import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 
 import typer
 
 from quasilpv import __version__
+from quasilpv.cli.console import print_json
+from quasilpv.cli.stopping import Stopped, raise_when_stopped
+from quasilpv.cli.streams import ReaderLeftError, answered, guarded_streams, open_missing_streams
 from quasilpv.cli.usage import usage_error
 from quasilpv.cli.verbs import VerbGroup
 from quasilpv.errors import (
@@ -21,6 +27,7 @@ from quasilpv.errors import (
     QuasilpvError,
     TransportError,
 )
+from quasilpv.files import one_command
 
 EXIT_CODES: tuple[tuple[type[QuasilpvError], int], ...] = (
     (InfeasibleError, 1),
@@ -30,7 +37,9 @@ EXIT_CODES: tuple[tuple[type[QuasilpvError], int], ...] = (
     (TransportError, 5),
     (PlantError, 6),
 )
-EXIT_INTERRUPTED = 130
+EXIT_NOT_SHOWN, EXIT_MISTAKE, EXIT_INTERRUPTED, EXIT_READER_LEFT = 1, 70, 130, 141
+TRACEBACK = "QUASILPV_TRACEBACK"
+"""Variable of the environment: with it, a mistake of the program is told with its traceback."""
 
 HELP = """Control design for nonlinear descriptor systems and robots, from the model to the tracked trajectory.
 
@@ -54,9 +63,11 @@ Examples:
 
 \b
 Exit codes:
-  0 done              1 infeasible, or a claim does not hold
-  2 bad input         3 fault stop
-  5 no transport      6 plant failure
+  0 done                    1 infeasible, or a claim does not hold
+  2 bad input, or output    3 fault stop
+    that cannot be written  5 no transport
+  6 plant failure           70 a mistake of this program
+  128 + n stopped by signal n: 130 Ctrl-C, 141 the reader of a pipe has left
 """
 
 app = typer.Typer(
@@ -91,6 +102,20 @@ def run(arguments: Sequence[str]) -> int:
     Args:
         arguments: the command line without the program's name.
     """
+    with one_command(shlex.join(["design", *arguments])):
+        try:
+            with guarded_streams():
+                return _run(arguments)
+        except ReaderLeftError:
+            return EXIT_READER_LEFT
+        except Stopped as stop:
+            return _fail(f"stopped by {stop.signal.name}", 128 + stop.signal)
+        except InputError as error:  # of standard output
+            return _fail(str(error), 2)
+
+
+def _run(arguments: Sequence[str]) -> int:
+    """Run the command on guarded streams."""
     try:
         code = app(args=list(arguments), prog_name="design", standalone_mode=False)
         if code == EXIT_INTERRUPTED:
@@ -99,8 +124,10 @@ def run(arguments: Sequence[str]) -> int:
     except typer.TyperException as error:
         return _fail(str(usage_error(error)), 2)
     except QuasilpvError as error:
-        codes = (code for kind, code in EXIT_CODES if isinstance(error, kind))
-        return _fail(str(error), next(codes, 1))
+        code = next((code for kind, code in EXIT_CODES if isinstance(error, kind)), EXIT_MISTAKE)
+        if code == EXIT_NOT_SHOWN and "--json" in arguments and not answered():
+            print_json({"error": type(error).__name__.removesuffix("Error").lower(), "reason": str(error)})
+        return _fail(str(error), code)
     except (KeyboardInterrupt, typer.Abort):
         return _fail("interrupted", EXIT_INTERRUPTED)
     except ImportError:
@@ -108,14 +135,29 @@ def run(arguments: Sequence[str]) -> int:
         if unloadable is None:
             raise
         return _fail(str(unloadable), 2)
-    except BrokenPipeError:  # the reader of a pipe has left: nobody is there to be told
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
 
 
 def main() -> None:
     """Entry point of the command ``design``."""
-    sys.exit(run(sys.argv[1:]))
+    open_missing_streams()
+    raise_when_stopped()
+    try:
+        code = run(sys.argv[1:])
+    except Exception as error:
+        code = _report_mistake(error)
+    sys.exit(code)
+
+
+def _report_mistake(error: Exception) -> int:
+    """Say what nobody has foreseen, in a line; the traceback, for a report, if it is asked for."""
+    if os.environ.get(TRACEBACK):
+        traceback.print_exception(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{os.path.basename(place.filename)}:{place.lineno}"
+    return _fail(
+        f"{type(error).__name__} at {where}: {error} (a mistake of this program; {TRACEBACK}=1 tells more)",
+        EXIT_MISTAKE,
+    )
 
 
 def _unloadable_runtime() -> InputError | None:
@@ -130,5 +172,6 @@ def _unloadable_runtime() -> InputError | None:
 
 
 def _fail(message: str, code: int) -> int:
-    print("error:", " ".join(message.split()), file=sys.stderr)
+    with suppress(OSError, ValueError):  # nobody can be told
+        print("error:", " ".join(message.split()), file=sys.stderr, flush=True)
     return code

@@ -14,6 +14,7 @@ from quasilpv.cli.session import Session, draw_results
 from quasilpv.cli.synth import write_released
 from quasilpv.cli.track import default_variants, run_all
 from quasilpv.experiments.track import TrackingExperiment
+from quasilpv.files import claim_folder
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
 ROBOT = "arm3"
@@ -40,6 +41,7 @@ def demo_command(
     Example:
       design demo
     """
+    claim_folder(out)
     if not json:
         print_note(f"a design for {ROBOT}, then every controller on {' and '.join(SCENARIOS)}: a few minutes")
     released = write_released(

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from quasilpv.artifact import read_artifact
-from quasilpv.artifact.files import write_atomically
 from quasilpv.cli.console import JsonOption, print_json, print_note
+from quasilpv.files import claim_file, write_atomically
 from quasilpv.lmi import SdpaProgram
 from quasilpv.synthesis.shipped_problem import shipped_problem
 
@@ -30,6 +30,7 @@ def export_sdp_command(
       design export-sdp out/arm3/artifact.json -o out/arm3/problem.dat-s
     """
     shipped = read_artifact(artifact)
+    claim_file(out)
     problem = shipped_problem(shipped.content(), str(artifact))
     program = SdpaProgram.of(problem, (f"{shipped.name}, artifact {shipped.hash}",))
     write_atomically({out: program.to_text().encode()})

@@ -15,6 +15,7 @@ from quasilpv.cli.logs import LogArtifactOption, open_log
 from quasilpv.errors import ClaimError, InputError
 from quasilpv.experiments.logged import logged_result
 from quasilpv.figures.gallery import write_gallery
+from quasilpv.files import claim_file, claim_folder
 from quasilpv.telemetry import RunLog
 from quasilpv.telemetry.codes import event_in_words
 from quasilpv.telemetry.log import ARTIFACT, HEADER, Messages
@@ -117,7 +118,9 @@ def _cell(value: float | None) -> str:
 
 
 def _plot(log: RunLog, out: Path | None, json: bool) -> None:
-    files = write_gallery(logged_result(log), out or Path(log.source).parent)
+    folder = out or Path(log.source).parent
+    claim_folder(folder)
+    files = write_gallery(logged_result(log), folder)
     if json:
         print_json({"figures": [str(path) for path in files]})
     else:
@@ -137,6 +140,7 @@ def _replay(log: RunLog, _: Path | None, json: bool) -> None:
 
 def _to_mcap(log: RunLog, out: Path | None, json: bool) -> None:
     path = out or Path(log.source).with_suffix(".mcap")
+    claim_file(path)
     count = write_mcap(log, path)
     if json:
         print_json({"mcap": str(path), "messages": count})

@@ -8,12 +8,12 @@ from typing import Annotated
 
 import typer
 
-from quasilpv.artifact.files import write_readable_json
 from quasilpv.cli.console import JsonOption, print_json, print_note, progress
 from quasilpv.cli.parameters import asks_one_question, axis
 from quasilpv.errors import InputError
 from quasilpv.figures.region import region_figure
 from quasilpv.figures.style import save
+from quasilpv.files import claim_folder, write_readable_json
 from quasilpv.studies.checkpoint import Checkpoint
 from quasilpv.studies.engines import in_processes, on_cluster
 from quasilpv.studies.question import Question
@@ -48,6 +48,7 @@ def region_command(
     if processes is not None and processes < 1:
         raise InputError("command line", "--processes", processes, "at least 1")
     solver = on_cluster(dask) if dask else in_processes(processes or os.cpu_count() or 1)
+    claim_folder(out)
     memory = Checkpoint(out, asked, (across.name, up.name))
     if memory.size:
         print_note(f"{memory.size} points known from {memory.path}")

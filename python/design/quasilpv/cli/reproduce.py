@@ -9,6 +9,7 @@ import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table, progress
 from quasilpv.errors import InputError
+from quasilpv.files import claim_folder
 from quasilpv.reproduction import ITEMS, Effort, item, reproduce
 
 REASON_WIDTH = 100
@@ -38,6 +39,7 @@ def reproduce_command(
         got = "both items and --all" if ids else "nothing"
         raise InputError("command line", "reproduce", got, "--all, or items of design list")
     wanted = list(ITEMS.values()) if everything else [item(name) for name in dict.fromkeys(ids or ())]
+    claim_folder(out)
     with progress(len(wanted)) as steps:
         effort = Effort.QUICK if quick else Effort.FULL
         rows = reproduce(wanted, effort, out, begin=steps.begin, end=steps.end)

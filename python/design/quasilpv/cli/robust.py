@@ -18,6 +18,7 @@ from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
 from quasilpv.figures.growth import growth_figure
 from quasilpv.figures.margins import margin_figure
 from quasilpv.figures.style import save
+from quasilpv.files import claim_folder
 
 MARGIN_FIGURE, GROWTH_FIGURE = "inertia-margin", "growth-rate"
 BEYOND_THE_MARGIN = fmpq(3, 2)
@@ -42,6 +43,8 @@ def robust_command(
     Example:
       design robust out/arm3/artifact.json -o out/arm3
     """
+    if out is not None:
+        claim_folder(out)
     found = gate(read_artifact(artifact).content(), str(artifact))
     if json:
         print_json(found.to_document())

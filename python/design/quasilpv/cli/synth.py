@@ -18,6 +18,7 @@ from quasilpv.cli.options import (
     require_controller,
     specification,
 )
+from quasilpv.files import claim_folder
 from quasilpv.release import release
 from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, Specification
 from quasilpv.systems.registry import robot
@@ -59,7 +60,9 @@ def synth_command(
     wanted = specification(
         robot_id, design, rate_hz, encoder_bits, margin_spare=margin_spare, torque_activity=torque_activity
     )
-    answer = write_released(robot_id, design, wanted, out or Path("out") / robot_id, allow_unverified=allow_unverified)
+    folder = out or Path("out") / robot_id
+    claim_folder(folder)
+    answer = write_released(robot_id, design, wanted, folder, allow_unverified=allow_unverified)
     if json:
         print_json(answer)
     else:

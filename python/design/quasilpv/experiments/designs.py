@@ -11,6 +11,7 @@ from quasilpv.artifact import Artifact, read_artifact, write_artifact
 from quasilpv.artifact.canonical import document_hash
 from quasilpv.artifact.store import JSON_NAME
 from quasilpv.errors import InputError
+from quasilpv.files import forget_input
 from quasilpv.release import checked_artifact, design_inputs
 from quasilpv.synthesis import Specification, TrackingDesign, synthesise, without_compensation
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
@@ -71,6 +72,7 @@ def kept_design(
     try:
         return read_artifact(place / JSON_NAME)
     except InputError:  # not there, or damaged: made again
+        forget_input(place / JSON_NAME)
         design = _designed(robot_id, controller, specification, progress)
         made = checked_artifact(design if disturbance_compensation else without_compensation(design))
         write_artifact(place, made)

@@ -19,10 +19,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from PIL import Image
 
-from quasilpv.artifact.files import write_atomically
 from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.style import BLACK, BLUE, REFERENCE_COLOUR, VERMILION, WIDTH_IN, length_unit, style
+from quasilpv.files import write_atomically
 from quasilpv.systems.mechanism import PlanarMechanism
 
 FRAMES_PER_SECOND = 20

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from quasilpv.artifact.files import written_whole
 from quasilpv.errors import InputError
+from quasilpv.files import read_large, written_whole
 
 SUFFIX = ".lcmlog"
 _SYNC_WORD = b"\xed\xa1\xda\x01"
@@ -44,10 +44,7 @@ def read_events(path: Path | str) -> Iterator[Event]:
         InputError: the file cannot be read, is no log, or ends inside an event.
     """
     source = str(path)
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(source, "file", error.strerror or error, _NO_LOG) from error
+    content = read_large(path, _NO_LOG)
     if not content:
         raise InputError(source, "file", "an empty file", _NO_LOG)
     offset, number = 0, 0

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from quasilpv.artifact.files import written_whole
+from quasilpv.files import written_whole
 from quasilpv.telemetry.log import ARTIFACT, RunLog
 from quasilpv.telemetry.message_types import MessageType
 

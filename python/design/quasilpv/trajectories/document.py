@@ -20,10 +20,10 @@ from quasilpv.artifact.canonical import (
     parse_document,
     with_hash,
 )
-from quasilpv.artifact.files import read_bytes, write_atomically
 from quasilpv.artifact.programs import MAX_JOINTS
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError
+from quasilpv.files import read_bytes, write_atomically
 
 Array = npt.NDArray[np.float64]
 Quintic = tuple[float, float, float, float, float, float]

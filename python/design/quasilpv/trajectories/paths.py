@@ -19,8 +19,8 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from quasilpv.artifact.canonical import parse_strict_json
-from quasilpv.artifact.files import read_bytes
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
+from quasilpv.files import read_bytes
 
 Array = npt.NDArray[np.float64]
 Point = tuple[float, float]
