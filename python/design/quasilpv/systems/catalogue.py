@@ -61,7 +61,7 @@ def system_kind(reference: str) -> SystemKind:
     if reference in installed:
         return entry_point_kind(installed[reference])
     names = one_of(system_names(), reference)
-    raise InputError("systems", "system", reference, f"FILE.py:NAME, or {names}")
+    raise InputError("systems", "system", reference, f"{names}; or FILE.py:NAME")
 
 
 def system_names() -> list[str]:
