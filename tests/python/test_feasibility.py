@@ -3,15 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 
 from quasilpv.lmi import Outcome, Problem, Variable, block, he, is_positive_definite, largest_margin, to_rational
+from quasilpv.lmi.common import common_problem
 from quasilpv.lmi.compiled import CompiledProblem, compile_family, rounded
 from quasilpv.lmi.feasibility import decide
 from quasilpv.lmi.independence import independent_columns
@@ -162,6 +163,47 @@ def test_a_family_gives_the_problem_of_every_parameter_point_exactly(a: float, b
 
 def test_data_that_are_not_affine_in_a_parameter_have_no_family() -> None:
     assert compile_family(lambda p: lyapunov(np.array([[-1.0 - p["a"] ** 2]])), {"a": 1.0}) is None
+
+
+@given(st.lists(st.integers(-3, 3), min_size=10, max_size=10), st.sampled_from([0.0, 0.5, -3.0]))
+@example([0, 351, 530, -351, 615, -530, 0, 0, 0, 0], 0.0)  # zero at (0,0), (1,0), (0,1), (7/4,7/2) and (13/4,15/4)
+@settings(max_examples=30, deadline=None)
+def test_a_family_is_accepted_if_and_only_if_its_polynomials_are_affine(coefficients: list[int], base: float) -> None:
+    """All polynomials of degree three at most, in powers of a and b that double arithmetic does without rounding."""
+    powers = [(i, j) for total in range(4) for i, j in product(range(total + 1), repeat=2) if i + j == total]
+
+    def build(point: Mapping[str, float]) -> Problem:
+        value = sum(c * point["a"] ** i * point["b"] ** j for c, (i, j) in zip(coefficients, powers, strict=True))
+        return lyapunov(np.array([[-1.0 + value]]))
+
+    found = compile_family(build, {"a": base, "b": 2.0 * base})
+    assert (found is not None) == (not any(coefficients[3:]))
+
+
+@given(SEEDS, st.integers(2, 6))
+@settings(max_examples=25, deadline=None)
+def test_one_solution_for_several_points_proves_every_point_of_their_hull(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    compiled = compile_family(family, {"a": 0.0, "b": 0.0})
+    assert compiled is not None
+    corners = [dict(zip("ab", rng.uniform(-1.5, 1.5, 2).tolist(), strict=True)) for _ in range(count)]
+    decision = decide(common_problem(compiled, corners))
+    assume(decision.feasible)
+    (P,) = decision.values.values()
+    for weights in rng.dirichlet(np.ones(count), 20):
+        inside = {name: float(weights @ [corner[name] for corner in corners]) for name in "ab"}
+        a, b = inside["a"], inside["b"]
+        A = np.array([[-1.0 + a, 2.0 * b], [0.5, -3.0 - a]])
+        assert np.linalg.eigvalsh(P)[0] > 0.0 > np.linalg.eigvalsh(A @ P + P @ A.T)[-1]
+        assert compiled.at(inside).holds_exactly(decision.point)
+
+
+def test_points_that_are_feasible_one_by_one_need_not_have_a_common_solution() -> None:
+    compiled = compile_family(lambda p: lyapunov(np.array([[-0.1, p["a"]], [-p["b"], -0.1]])), {"a": 1.0, "b": 1.0})
+    assert compiled is not None
+    ends = [{"a": 9.0, "b": 0.1}, {"a": 0.1, "b": 9.0}]
+    assert all(decide(compiled.at(end)).feasible for end in ends)
+    assert not decide(common_problem(compiled, ends)).feasible
 
 
 @given(SEEDS)

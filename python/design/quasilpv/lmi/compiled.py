@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import product
 from math import lcm
 from typing import Any
 
@@ -34,6 +35,9 @@ CANDIDATE_BITS = 40
 
 SHORT = 2**62
 """Integers below it, in magnitude, are held in 64 bits."""
+
+DEGREE = 3
+"""Of inequalities as polynomials in parameters in which E, A and B are affine: two of them, and a basis, multiplied."""
 
 HALF = 2 ** (CANDIDATE_BITS // 2)
 """Cuts the integers of a candidate point in two."""
@@ -239,30 +243,28 @@ class CompiledFamily:
 def compile_family(build: Callable[[Mapping[str, float]], Problem], base: Mapping[str, float]) -> CompiledFamily | None:
     """Compile a family of problems, or None if its data are not affine in the parameters.
 
-    The problem is built at the base point, at a unit step along every parameter, and at two further points where the
-    affine model is compared with the truth, exactly.
+    The problem is built at the points of `lattice`, of which the first give the affine model. At all of them it is
+    compared with the truth, exactly: for polynomials of degree `DEGREE` at most, equality there is equality everywhere.
 
     Args:
         build: the problem at a parameter point; always the same unknowns and inequalities in the same order.
         base: names of the parameters and a point.
     """
     names = tuple(base)
+    nodes = lattice(base)
     problem = build(base)
-    tables = [_Coefficients.of(problem)]
-    tables += [_Coefficients.of(build({**base, name: base[name] + 1.0})) for name in names]
-    tests = _test_points(base)
-    tables += [_Coefficients.of(build(test)) for test in tests]
+    tables = [_Coefficients.of(member) for member in (problem, *map(build, nodes[1:]))]
     places = np.unique(np.concatenate([table.places for table in tables]))
     denominator = lcm(*(table.denominator for table in tables))
     origin, *others = (table.spread(places, denominator) for table in tables)
-    slopes, seen = [row - origin for row in others[: len(names)]], others[len(names) :]
+    slopes = [row - origin for row in others[: len(names)]]
     shift = [Fraction(base[name]) for name in names]
     scale = lcm(1, *(value.denominator for value in shift))
     constant = scale * origin - sum((int(scale * p) * row for p, row in zip(shift, slopes, strict=True)), 0)
     coefficients = np.stack([constant, *(scale * row for row in slopes)])
     family = CompiledFamily(_layout(problem, places, coefficients), names, coefficients, denominator * scale)
-    for test, row in zip(tests, seen, strict=True):
-        member = family.at(test)
+    for node, row in zip(nodes, (origin, *others), strict=True):
+        member = family.at(node)
         if np.any(member.coefficients.astype(object) * denominator != row * member.denominator):
             return None
     return family
@@ -277,14 +279,15 @@ def rounded(point: FloatArray) -> FloatArray:
     return np.asarray(np.round(point / unit) * unit)
 
 
-def _test_points(base: Mapping[str, float]) -> list[dict[str, float]]:
-    """Two points off the axes through the base point, above it: masses and frictions are bounded below only.
+def lattice(base: Mapping[str, float]) -> list[dict[str, float]]:
+    """Points at which a polynomial of degree `DEGREE` is zero only if it is zero everywhere.
 
-    The values are exact in double.
+    They are ``base + k`` for whole k >= 0 of sum `DEGREE` at most (principal lattice of a simplex, Nicolaides 1972), by
+    that sum: the base point, one step along every parameter, the others. Masses and frictions are bounded below only.
     """
-    first = {name: base[name] + 1.75 * (k + 1) for k, name in enumerate(base)}
-    second = {name: base[name] + 3.25 + 0.5 * k for k, name in enumerate(base)}
-    return [first, second]
+    steps = [k for k in product(range(DEGREE + 1), repeat=len(base)) if sum(k) <= DEGREE]
+    steps.sort(key=lambda k: (sum(k), [-step for step in k]))
+    return [{name: base[name] + step for name, step in zip(base, k, strict=True)} for k in steps]
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,6 +32,8 @@ class Decision:
         outcome: `Outcome.VERIFIED` (proved, exact arithmetic), `Outcome.SOLVER_ONLY`, `Outcome.INFEASIBLE_NUMERICALLY`
             or `Outcome.UNKNOWN`.
         values: the proved point, one matrix per variable; empty otherwise.
+        point: the same as the kept unknowns of the compiled problem, which proves it again
+            (`CompiledProblem.holds_exactly`); empty otherwise.
         margin: at that point, the smallest eigenvalue of all inequalities over the mean of all their eigenvalues, in
             double: at most the largest margin there is (`quasilpv.lmi.margin`). NaN otherwise.
         excluded_norm: of a numerically infeasible problem: no x of smaller Euclidean norm satisfies ``F_k(x) >= I``,
@@ -42,6 +44,7 @@ class Decision:
 
     outcome: Outcome
     values: Mapping[Variable, FloatArray] = field(default_factory=dict)
+    point: FloatArray = field(default_factory=lambda: np.empty(0))
     margin: float = float("nan")
     excluded_norm: float = float("nan")
     solver_status: str = ""
@@ -72,7 +75,14 @@ def decide(problem: CompiledProblem) -> Decision:
         candidate = rounded(point)
         if problem.holds_exactly(candidate):
             margin = _margin(problem, coefficients @ candidate)
-            return Decision(Outcome.VERIFIED, problem.values(candidate), margin, np.nan, status, solution.iterations)
+            return Decision(
+                Outcome.VERIFIED,
+                problem.values(candidate),
+                candidate,
+                margin,
+                solver_status=status,
+                iterations=solution.iterations,
+            )
         if status == "Solved":
             return Decision(Outcome.SOLVER_ONLY, solver_status=status, iterations=solution.iterations)
     if "PrimalInfeasible" in status:

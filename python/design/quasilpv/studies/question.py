@@ -9,11 +9,14 @@ from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
+import numpy as np
+
 from quasilpv.conditions.condition import Options, Statement
 from quasilpv.conditions.registry import condition
 from quasilpv.lmi import Outcome, largest_margin
+from quasilpv.lmi.common import common_problem
 from quasilpv.lmi.compiled import CompiledFamily, CompiledProblem, compile_family
-from quasilpv.lmi.feasibility import decide
+from quasilpv.lmi.feasibility import Decision, decide
 from quasilpv.polytopes import PolytopicModel, polytopic_model
 from quasilpv.systems.catalogue import system_kind
 
@@ -102,6 +105,8 @@ class Answer:
             at least I, as far as the solver's certificate was computed correctly. None otherwise.
         unknowns, rows: scalar unknowns and rows (summed sizes) of the inequalities as solved.
         seconds: wall time, building included.
+        witness: the kept unknowns at which every inequality was proved, for `Sweep.proves`; empty if there is no such
+            proof.
     """
 
     verdict: Verdict
@@ -111,6 +116,7 @@ class Answer:
     unknowns: int
     rows: int
     seconds: float
+    witness: tuple[float, ...] = ()
 
 
 class Sweep:
@@ -139,26 +145,46 @@ class Sweep:
             point: a value for every swept parameter.
         """
         start = time.perf_counter()
-        compiled = self._problem(point)
+        compiled = self._problem([point])
         decision = decide(compiled)
         outcome = decision.outcome
         unclear = outcome in {Outcome.UNKNOWN, Outcome.SOLVER_ONLY}
         if unclear and _is_small(sum(compiled.layout.sizes), compiled.layout.unknowns):
             outcome = largest_margin(self.question.at(point).statement().problem).outcome
-        return Answer(
-            verdict=_VERDICTS.get(outcome, Verdict.UNKNOWN),
-            certified=outcome is Outcome.VERIFIED,
-            margin=_finite(decision.margin),
-            excluded_norm=_finite(decision.excluded_norm),
-            unknowns=compiled.layout.unknowns,
-            rows=sum(compiled.layout.sizes),
-            seconds=time.perf_counter() - start,
-        )
+        return _answer(compiled, decision, outcome, start)
 
-    def _problem(self, point: Mapping[str, float]) -> CompiledProblem:
+    def common(self, points: Sequence[Mapping[str, float]]) -> Answer:
+        """One solution for several points: it holds in their whole convex hull (`quasilpv.lmi.common`).
+
+        A verdict other than feasible says nothing about any point.
+
+        Args:
+            points: values for every swept parameter.
+
+        Raises:
+            ValueError: the data are not affine in the swept parameters.
+        """
+        start = time.perf_counter()
+        compiled = self._problem(points)
+        decision = decide(compiled)
+        return _answer(compiled, decision, decision.outcome, start)
+
+    def proves(self, points: Sequence[Mapping[str, float]], witness: Sequence[float]) -> bool:
+        """Whether the witness of an answer proves it, in exact arithmetic.
+
+        Args:
+            points: that the answer was about.
+            witness: of the answer.
+        """
+        compiled = self._problem(points)
+        return len(witness) == len(compiled.layout.kept) and compiled.holds_exactly(np.array(witness))
+
+    def _problem(self, points: Sequence[Mapping[str, float]]) -> CompiledProblem:
         if self._family is not None:
-            return self._family.at({name: point[name] for name in self.swept})
-        return CompiledProblem.of(self.question.at(point).statement().problem)
+            return common_problem(self._family, [{name: point[name] for name in self.swept} for point in points])
+        if len(points) > 1:
+            raise ValueError(f"the data are not affine in {', '.join(self.swept)}: points have nothing in common")
+        return CompiledProblem.of(self.question.at(points[0]).statement().problem)
 
     def _compile(self) -> CompiledFamily | None:
         parameters = system_kind(self.question.system).parameters
@@ -166,6 +192,19 @@ class Sweep:
             return None
         base = {name: dict(self.question.parameters).get(name, parameters[name].default) for name in self.swept}
         return compile_family(lambda point: self.question.at(point).statement().problem, base)
+
+
+def _answer(compiled: CompiledProblem, decision: Decision, outcome: Outcome, start: float) -> Answer:
+    return Answer(
+        verdict=_VERDICTS.get(outcome, Verdict.UNKNOWN),
+        certified=outcome is Outcome.VERIFIED,
+        margin=_finite(decision.margin),
+        excluded_norm=_finite(decision.excluded_norm),
+        unknowns=compiled.layout.unknowns,
+        rows=sum(compiled.layout.sizes),
+        seconds=time.perf_counter() - start,
+        witness=tuple(decision.point.tolist()),
+    )
 
 
 def largest_or_reached_margin(question: Question, answer: Answer) -> float | None:
