@@ -208,8 +208,9 @@ class TestCommands:
         done = self.design("solve", "ex-I.1", "--condition", "II.6", "--set", "b=2.5", "--json")
         answer = json.loads(done.stdout)
         assert done.returncode == 0
-        assert set(answer) == {"verdict", "certified", "margin", "unknowns", "rows", "seconds"}
-        assert (answer["verdict"], answer["certified"]) == ("feasible", True)
+        sizes = {"certified", "margin", "unknowns", "rows", "seconds"}
+        assert set(answer) == {"verdict", "evidence", "reason", "refutation"} | sizes
+        assert (answer["verdict"], answer["evidence"], answer["certified"]) == ("feasible", "proved", True)
         assert answer["margin"] > 0
 
     def test_infeasible_is_exit_code_1_and_a_negative_margin(self) -> None:

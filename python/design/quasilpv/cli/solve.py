@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from quasilpv.cli.console import JsonOption, print_json
 from quasilpv.cli.parameters import asks_one_question
-from quasilpv.studies import Answer, Sweep, Verdict
+from quasilpv.studies import Verdict, answered
 from quasilpv.studies.question import Question, largest_or_reached_margin
 
 
@@ -14,21 +14,25 @@ def solve_command(
     *,
     json: JsonOption = False,
 ) -> int:
-    """Decide whether a condition holds for a system: feasible with a proof, infeasible numerically, or unknown.
+    """Decide whether a condition holds for a system.
 
-    Exit code 0 if feasible, 1 otherwise.
+    The answer is one of four: feasible, proved; infeasible, proved; infeasible, numerically; unknown. Exit code 0 if
+    feasible, 1 otherwise.
 
     \b
     Examples:
       design solve ex-I.1 --condition II.6 --set a=1 --set b=2.5
       design solve ex-I.1 --condition II.6 --set b=3 --slack full --json
     """
-    answer = Sweep(asked, ()).at({})
+    answer = answered(asked)
     margin = largest_or_reached_margin(asked, answer)
     if json:
         print_json(
             {
                 "verdict": answer.verdict.value,
+                "evidence": answer.evidence and answer.evidence.value,
+                "reason": answer.reason,
+                "refutation": answer.refutation and answer.refutation.to_document(),
                 "certified": answer.certified,
                 "margin": margin,
                 "unknowns": answer.unknowns,
@@ -37,16 +41,7 @@ def solve_command(
             }
         )
     else:
-        print(_sentence(answer))
+        print(f"{answer.headline}: {answer.reason}")
         shown = "unknown" if margin is None else f"{margin:.3g}"
         print(f"margin {shown}, {answer.unknowns} unknowns, {answer.rows} rows, {answer.seconds:.3f} s")
     return 0 if answer.verdict is Verdict.FEASIBLE else 1
-
-
-def _sentence(answer: Answer) -> str:
-    if answer.certified:
-        return "feasible: a solution satisfies every inequality, checked in exact arithmetic"
-    if answer.verdict is Verdict.INFEASIBLE:
-        sure = f", none of norm below {answer.excluded_norm:.1e}" if answer.excluded_norm else ""
-        return f"infeasible: the solver found no solution{sure} (numerical, not a proof)"
-    return "unknown: the solver came to no conclusion"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from math import isfinite
 from typing import TypeAlias
@@ -66,6 +66,15 @@ class Options:
             raise InputError("condition", "window", self.window_s, "a finite time > 0, or none for the limit")
         if not (isfinite(self.sample_period_s) and self.sample_period_s > 0.0):
             raise InputError("condition", "sample period", self.sample_period_s, "a finite time > 0")
+
+    def in_units(self, units: Units) -> Options:
+        """The same options for the system in other units: rates and times in its unit of time, exactly."""
+        return replace(
+            self,
+            decay_rate=self.decay_rate * units.c,
+            window_s=None if self.window_s is None else self.window_s / units.c,
+            sample_period_s=self.sample_period_s / units.c,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, style
-from quasilpv.studies.question import Question, Verdict
+from quasilpv.studies.answer import Verdict
+from quasilpv.studies.question import Question
 from quasilpv.studies.region import Region
 from quasilpv.systems.catalogue import system_kind
 

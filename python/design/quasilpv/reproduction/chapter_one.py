@@ -10,7 +10,8 @@ from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.grids import axis, grid, nested_figure, sizes
 from quasilpv.reproduction.item import Check, Effort, Finding, Item
-from quasilpv.studies.question import Question, Sweep, Verdict
+from quasilpv.studies.answer import Verdict
+from quasilpv.studies.question import Question, Sweep
 from quasilpv.studies.region import Region
 
 ARM2_AXES = ("mass m2 of link 2 (kg)", "friction fv1 = fv2/2 (N m s/rad)")

@@ -9,8 +9,9 @@ from quasilpv.conditions.condition import Options
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.grids import axis, grid, limits, nested_figure, sizes
 from quasilpv.reproduction.item import Effort, Finding, Item
+from quasilpv.studies.answer import Verdict
 from quasilpv.studies.boundary import Interval
-from quasilpv.studies.question import Question, Sweep, Verdict
+from quasilpv.studies.question import Question, Sweep
 from quasilpv.studies.region import Axis, Region
 
 PROXIES = (

@@ -20,8 +20,9 @@ from quasilpv.polytopes import polytopic_model
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.grids import axis, grid, limits, nested_figure, sizes
 from quasilpv.reproduction.item import Check, Effort, Finding, Item
+from quasilpv.studies.answer import Verdict
 from quasilpv.studies.boundary import Interval
-from quasilpv.studies.question import Question, Sweep, Verdict
+from quasilpv.studies.question import Question, Sweep
 from quasilpv.systems.premise import AffineMatrix
 
 METHODS = {

@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 from typing import TypeAlias
 
 from quasilpv.reproduction.item import Check
-from quasilpv.studies.question import Verdict
+from quasilpv.studies.answer import Verdict
 from quasilpv.studies.region import Region
 
 FACTOR = 1.25

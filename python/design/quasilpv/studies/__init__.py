@@ -1,7 +1,19 @@
 """Questions about conditions: one point, a boundary, a map, a count. Every yes is proved in exact arithmetic."""
 
+from quasilpv.studies.answer import Answer, Evidence, Verdict
 from quasilpv.studies.boundary import Boundary, find_boundary
 from quasilpv.studies.complexity import Complexity, count
-from quasilpv.studies.question import Answer, Question, Sweep, Verdict
+from quasilpv.studies.question import Question, Sweep, answered
 
-__all__ = ["Answer", "Boundary", "Complexity", "Question", "Sweep", "Verdict", "count", "find_boundary"]
+__all__ = [
+    "Answer",
+    "Boundary",
+    "Complexity",
+    "Evidence",
+    "Question",
+    "Sweep",
+    "Verdict",
+    "answered",
+    "count",
+    "find_boundary",
+]

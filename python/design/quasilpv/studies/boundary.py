@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from quasilpv.errors import InputError
-from quasilpv.studies.question import Answer, Question, Sweep, Verdict
+from quasilpv.studies.answer import Answer, Verdict
+from quasilpv.studies.question import Question, Sweep
 from quasilpv.systems.catalogue import system_kind
 
 RELATIVE_TOLERANCE = 1e-3

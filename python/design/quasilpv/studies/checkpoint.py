@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from quasilpv.errors import InputError
-from quasilpv.studies.question import Answer, Question, Verdict
+from quasilpv.studies.answer import Answer
+from quasilpv.studies.question import Question
 from quasilpv.studies.region import Axis
 from quasilpv.systems.catalogue import system_kind
 
@@ -70,7 +71,7 @@ class Checkpoint:
     def put(self, place: tuple[float, float], answer: Answer) -> None:
         """Keep an answer; it is on disk when this returns."""
         self._known[place] = answer
-        self._file.write(json.dumps({"place": list(place), **asdict(answer)}) + "\n")
+        self._file.write(json.dumps({"place": list(place), **answer.to_document()}) + "\n")
         self._file.flush()
 
     def _read(self) -> None:
@@ -85,7 +86,7 @@ class Checkpoint:
                 entry = json.loads(line)
                 place = (float(entry["place"][0]), float(entry["place"][1]))
                 fields = {name: value for name, value in entry.items() if name != "place"}
-                self._known[place] = Answer(**{**fields, "verdict": Verdict(fields["verdict"])})
+                self._known[place] = Answer.from_document(fields)
             except (ValueError, KeyError, TypeError, IndexError):
                 raise InputError(
                     str(self.path), f"line {number}", line[:60].decode("utf-8", "replace"), "an answer of a map"

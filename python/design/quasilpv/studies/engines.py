@@ -9,7 +9,7 @@ from typing import Any
 import joblib
 
 from quasilpv.errors import InputError
-from quasilpv.studies.question import Answer
+from quasilpv.studies.answer import Answer
 from quasilpv.studies.region import Solver, Task, solve_task
 
 

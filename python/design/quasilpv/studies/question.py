@@ -4,32 +4,27 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from enum import StrEnum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from quasilpv.conditions.condition import Options, Statement
 from quasilpv.conditions.registry import condition
-from quasilpv.lmi import Outcome, largest_margin
+from quasilpv.lmi import largest_margin
 from quasilpv.lmi.common import common_problem
 from quasilpv.lmi.compiled import CompiledFamily, CompiledProblem, compile_family
-from quasilpv.lmi.feasibility import Decision, decide
+from quasilpv.lmi.feasibility import decide
 from quasilpv.polytopes import PolytopicModel, polytopic_model
+from quasilpv.polytopes.scaling import ladder
+from quasilpv.polytopes.units import Units
+from quasilpv.studies.answer import Answer, Verdict
+from quasilpv.studies.examination import Case, Finding, examine, is_small, no_solution, solution, stated
+from quasilpv.studies.law import Law
 from quasilpv.systems.catalogue import system_kind
-
-MARGIN_PROGRAM_SIZE = 300_000
-"""Rows times unknowns; larger problems are not put to the margin program: it would take minutes."""
-
-
-class Verdict(StrEnum):
-    """What is known. `FEASIBLE` is a theorem, `INFEASIBLE` is what a solver found."""
-
-    FEASIBLE = "feasible"
-    INFEASIBLE = "infeasible"
-    UNKNOWN = "unknown"
+from quasilpv.systems.premise import AffineMatrix
 
 
 @dataclass(frozen=True)
@@ -68,13 +63,13 @@ class Question:
         """The same question with some parameters set."""
         return replace(self, parameters=tuple({**dict(self.parameters), **point}.items()))
 
-    def statement(self) -> Statement:
-        """The inequalities.
+    def statement(self, units: Units | None = None) -> Statement:
+        """The inequalities, for the system in other units if some are given.
 
         Raises:
             InputError: the condition does not apply to the system, or the representation does not.
         """
-        return condition(self.condition).build(self.model(), self.options)
+        return stated(condition(self.condition), self.model(), self.options, units)
 
     def model(self) -> PolytopicModel:
         """The system in its representation. Errors as `statement`."""
@@ -91,32 +86,6 @@ class Question:
             "parameters": dict(self.parameters),
             "options": asdict(self.options),
         }
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What is known about a question.
-
-    Attributes:
-        verdict: see `Verdict`.
-        certified: the verdict is feasible and proved in exact arithmetic.
-        margin: of a feasible problem, see `quasilpv.lmi.feasibility.Decision`; None otherwise.
-        excluded_norm: of an infeasible problem, how sure: no solution of smaller norm exists with all inequalities
-            at least I, as far as the solver's certificate was computed correctly. None otherwise.
-        unknowns, rows: scalar unknowns and rows (summed sizes) of the inequalities as solved.
-        seconds: wall time, building included.
-        witness: the kept unknowns at which every inequality was proved, for `Sweep.proves`; empty if there is no such
-            proof.
-    """
-
-    verdict: Verdict
-    certified: bool
-    margin: float | None
-    excluded_norm: float | None
-    unknowns: int
-    rows: int
-    seconds: float
-    witness: tuple[float, ...] = ()
 
 
 class Sweep:
@@ -147,11 +116,10 @@ class Sweep:
         start = time.perf_counter()
         compiled = self._problem([point])
         decision = decide(compiled)
-        outcome = decision.outcome
-        unclear = outcome in {Outcome.UNKNOWN, Outcome.SOLVER_ONLY}
-        if unclear and _is_small(sum(compiled.layout.sizes), compiled.layout.unknowns):
-            outcome = largest_margin(self.question.at(point).statement().problem).outcome
-        return _answer(compiled, decision, outcome, start)
+        if decision.feasible:
+            return _answer(compiled, solution(decision, 1), start)
+        case = _case(self.question, compiled, lambda: self.question.at(point).model(), self._sketch(point))
+        return _answer(compiled, examine(case, decision), start)
 
     def common(self, points: Sequence[Mapping[str, float]]) -> Answer:
         """One solution for several points: it holds in their whole convex hull (`quasilpv.lmi.common`).
@@ -166,63 +134,138 @@ class Sweep:
         """
         start = time.perf_counter()
         compiled = self._problem(points)
-        decision = decide(compiled)
-        return _answer(compiled, decision, decision.outcome, start)
+        decision, units = decide(compiled), None
+        if not decision.feasible and self._units is not None:
+            decision, units = decide(self._problem(points, self._units)), self._units
+        finding = solution(decision, 1, units=units) if decision.feasible else no_solution(decision)
+        return _answer(compiled, finding, start)
 
-    def proves(self, points: Sequence[Mapping[str, float]], witness: Sequence[float]) -> bool:
+    def proves(
+        self, points: Sequence[Mapping[str, float]], witness: Sequence[float], units: Units | None = None
+    ) -> bool:
         """Whether the witness of an answer proves it, in exact arithmetic.
 
         Args:
             points: that the answer was about.
-            witness: of the answer.
+            witness, units: of the answer.
         """
-        compiled = self._problem(points)
+        compiled = self._problem(points, units)
         return len(witness) == len(compiled.layout.kept) and compiled.holds_exactly(np.array(witness))
 
-    def _problem(self, points: Sequence[Mapping[str, float]]) -> CompiledProblem:
-        if self._family is not None:
-            return common_problem(self._family, [{name: point[name] for name in self.swept} for point in points])
-        if len(points) > 1:
+    def _problem(self, points: Sequence[Mapping[str, float]], units: Units | None = None) -> CompiledProblem:
+        """The inequalities at all these points, in one set of unknowns."""
+        places = [{name: point[name] for name in self.swept} for point in points]
+        if self._family is not None and units is None:
+            return common_problem(self._family, places)
+        if len(points) == 1:
+            return CompiledProblem.of(self.question.at(places[0]).statement(units).problem)
+        if self._family is None or units != self._units or self._rescaled is None:
             raise ValueError(f"the data are not affine in {', '.join(self.swept)}: points have nothing in common")
-        return CompiledProblem.of(self.question.at(points[0]).statement().problem)
+        return common_problem(self._rescaled, places)
+
+    @cached_property
+    def _units(self) -> Units | None:
+        """Units for several points at once: those fitted first at the question's own point."""
+        return next(ladder(self._samples[0][1].system)) if self._family is not None else None
+
+    @cached_property
+    def _rescaled(self) -> CompiledFamily | None:
+        """The family in those units."""
+        return compile_family(lambda point: self.question.at(point).statement(self._units).problem, self._base())
+
+    def _sketch(self, point: Mapping[str, float]) -> PolytopicModel | None:
+        """The system at a point, up to rounding, where it need not be built anew; the premises are those of all."""
+        if self._family is None:
+            return None
+        (base, origin), *slopes = self._samples
+        system = origin.system
+        moved: dict[str, Any] = {}
+        for name in "EABC":
+            start: AffineMatrix = getattr(system, name)
+            constant, coefficients = start.constant.copy(), start.coefficients.copy()
+            for swept, (_, other) in zip(self.swept, slopes, strict=True):
+                step: AffineMatrix = getattr(other.system, name)
+                distance = point[swept] - base[swept]
+                constant += distance * (step.constant - start.constant)
+                coefficients += distance * (step.coefficients - start.coefficients)
+            moved[name] = AffineMatrix(constant, coefficients)
+        return PolytopicModel(replace(system, **moved), origin.polytope)
+
+    @cached_property
+    def _samples(self) -> list[tuple[dict[str, float], PolytopicModel]]:
+        """The system at a point, and one step further along every swept parameter."""
+        base = self._base()
+        points = [base, *({**base, name: base[name] + 1.0} for name in self.swept)]
+        return [(place, self.question.at(place).model()) for place in points]
+
+    def _base(self) -> dict[str, float]:
+        parameters = system_kind(self.question.system).parameters
+        return {name: dict(self.question.parameters).get(name, parameters[name].default) for name in self.swept}
 
     def _compile(self) -> CompiledFamily | None:
         parameters = system_kind(self.question.system).parameters
         if not self.swept or not all(parameters[name].affine for name in self.swept):
             return None
-        base = {name: dict(self.question.parameters).get(name, parameters[name].default) for name in self.swept}
-        return compile_family(lambda point: self.question.at(point).statement().problem, base)
+        return compile_family(lambda point: self.question.at(point).statement().problem, self._base())
 
 
-def _answer(compiled: CompiledProblem, decision: Decision, outcome: Outcome, start: float) -> Answer:
-    return Answer(
-        verdict=_VERDICTS.get(outcome, Verdict.UNKNOWN),
-        certified=outcome is Outcome.VERIFIED,
-        margin=_finite(decision.margin),
-        excluded_norm=_finite(decision.excluded_norm),
-        unknowns=compiled.layout.unknowns,
-        rows=sum(compiled.layout.sizes),
-        seconds=time.perf_counter() - start,
-        witness=tuple(decision.point.tolist()),
-    )
+def answered(question: Question) -> Answer:
+    """Everything there is to say about one question, its law included.
+
+    Raises:
+        InputError: the condition does not apply to the system, or the representation does not.
+    """
+    start = time.perf_counter()
+    known, model = condition(question.condition), question.model()
+    statement = stated(known, model, question.options)
+    compiled = CompiledProblem.of(statement.problem)
+    decision = decide(compiled)
+    finding = solution(decision, 1)
+    if not decision.feasible:
+        finding = examine(_case(question, compiled, lambda: model), decision)
+    answer = _answer(compiled, finding, start)
+    if answer.verdict is not Verdict.FEASIBLE:
+        return answer
+    return replace(answer, law=Law.of(model.system, known.id, finding.feedback(statement)))
 
 
 def largest_or_reached_margin(question: Question, answer: Answer) -> float | None:
     """How far a question is from the edge between feasible and infeasible; see `quasilpv.lmi.margin`.
 
-    Of a problem too large for the margin program, what the answer reached; None if it is not feasible.
+    In the units of the answer, or those fitted first if it is not feasible: the margin depends on them. Of a problem
+    too large for the margin program, what the answer reached; None if it is not feasible.
     """
-    if not _is_small(answer.rows, answer.unknowns):
+    if not is_small(answer.rows, answer.unknowns):
         return answer.margin
-    return _finite(largest_margin(question.statement().problem).margin)
+    feasible = answer.verdict is Verdict.FEASIBLE
+    units = answer.units if feasible else next(ladder(question.model().system))
+    return _finite(largest_margin(question.statement(units).problem).margin)
 
 
-def _is_small(rows: int, unknowns: int) -> bool:
-    return rows * unknowns <= MARGIN_PROGRAM_SIZE
+def _case(
+    question: Question,
+    compiled: CompiledProblem,
+    exact: Callable[[], PolytopicModel],
+    sketch: PolytopicModel | None = None,
+) -> Case:
+    small = is_small(sum(compiled.layout.sizes), compiled.layout.unknowns)
+    return Case(condition(question.condition), question.options, small, exact, sketch)
+
+
+def _answer(compiled: CompiledProblem, finding: Finding, start: float) -> Answer:
+    return Answer(
+        verdict=finding.verdict,
+        evidence=finding.evidence,
+        reason=finding.reason,
+        margin=_finite(finding.decision.margin),
+        unknowns=compiled.layout.unknowns,
+        rows=sum(compiled.layout.sizes),
+        seconds=time.perf_counter() - start,
+        witness=tuple(finding.decision.point.tolist()) if finding.decision.feasible else (),
+        refutation=finding.refutation,
+        units=finding.units,
+    )
 
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-_VERDICTS = {Outcome.VERIFIED: Verdict.FEASIBLE, Outcome.INFEASIBLE_NUMERICALLY: Verdict.INFEASIBLE}

@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.errors import InputError
-from quasilpv.studies.question import Answer, Question, Sweep, Verdict
+from quasilpv.studies.answer import Answer, Verdict
+from quasilpv.studies.question import Question, Sweep
 from quasilpv.systems.catalogue import system_kind
 
 Node: TypeAlias = tuple[int, int]
