@@ -9,6 +9,7 @@ from typing import Annotated, Any, TypeAlias, TypeVar
 
 import typer
 
+from quasilpv.cli.usage import NUMBER_EXPECTED, number
 from quasilpv.conditions.blocks import Slack
 from quasilpv.conditions.condition import Form, Options
 from quasilpv.errors import InputError
@@ -154,7 +155,7 @@ def _named_range(text: str, option: str, count: int) -> tuple[str, list[float]]:
 
 
 def _number(part: str, option: str, text: str) -> float:
-    try:
-        return float(part)
-    except ValueError:
-        raise InputError("command line", option, text, f"a number instead of {part or 'nothing'}") from None
+    value = number(part)
+    if value is None:
+        raise InputError("command line", option, text, f"{NUMBER_EXPECTED} instead of {part or 'nothing'}")
+    return value

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import typer
@@ -12,6 +13,10 @@ from pydantic import ValidationError
 from quasilpv.errors import InputError, one_of
 
 NUMBERS = {"float_parsing": "a number", "int_parsing": "a whole number", "int_from_float": "a whole number"}
+LARGEST_NUMBER = 1e15
+"""Of a number that a person gives: whole numbers up to here are exact, and products of a few of them are finite."""
+NUMBER_EXPECTED = f"a number between -{LARGEST_NUMBER:g} and {LARGEST_NUMBER:g}"
+_DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 LIMITS = {"greater_than_equal": ("at least", "ge"), "less_than_equal": ("at most", "le")}
 
 
@@ -22,6 +27,42 @@ def usage_error(error: typer.TyperException) -> InputError:
     return InputError(
         "command line", field, got, f"{expected} ({context.command_path if context else 'design'} --help)"
     )
+
+
+def require_values(arguments: Sequence[str]) -> None:
+    """Refuse what looks like a value and is none: ``--out ""`` or ``--out=``, often a variable of a shell that is unset.
+
+    Raises:
+        InputError: an argument, or the value of an option, is empty.
+    """
+    for before, argument in zip(["", *arguments], arguments, strict=False):
+        option, separator, value = argument.partition("=")
+        if separator and option.startswith("--") and not value:
+            raise InputError("command line", option, "nothing", "a value")
+        if not argument:
+            field = before if before.startswith("-") else "arguments"
+            raise InputError("command line", field, "nothing", "a value")
+
+
+def require_bounded(parameter: Any, value: object) -> None:
+    """Refuse numbers that are not finite or larger than `LARGEST_NUMBER`.
+
+    Args:
+        parameter: an option or argument of a verb.
+        value: what was given for it, or its default.
+
+    Raises:
+        InputError: the option, and what is accepted.
+    """
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if is_number and not abs(value) <= LARGEST_NUMBER:  # type: ignore[arg-type]  # NaN compares with nothing
+        raise InputError("command line", _name(parameter), f"{value:g}", NUMBER_EXPECTED)
+
+
+def number(text: str) -> float | None:
+    """A number as a person types it, finite and at most `LARGEST_NUMBER` in magnitude; None if it is none."""
+    value = float(text) if _DECIMAL.fullmatch(text) else math.nan
+    return value if abs(value) <= LARGEST_NUMBER else None
 
 
 def _parts(error: typer.TyperException, context: Any) -> tuple[str, str, str]:

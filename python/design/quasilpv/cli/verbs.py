@@ -14,7 +14,20 @@ from typing import Any
 import typer
 from typer.core import CompletionItem, TyperCommand, TyperGroup  # type: ignore[attr-defined]
 
+from quasilpv.cli.usage import require_bounded, require_values
 from quasilpv.errors import InputError, one_of
+
+
+class VerbCommand(TyperCommand):
+    """A verb, whose values are all there and all of a size that can be computed with."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the command line. InputError: a value is empty, not finite, or beyond all bounds."""
+        require_values(args)
+        rest: list[str] = super().parse_args(ctx, args)
+        for parameter in self.params:
+            require_bounded(parameter, ctx.params.get(parameter.name))
+        return rest
 
 
 @dataclass(frozen=True)
@@ -33,7 +46,7 @@ class Verb:
         """Import the verb and build its command."""
         function = getattr(import_module(f"quasilpv.cli.{self.module}"), f"{self.module}_command")
         alone = typer.Typer(add_completion=False, rich_markup_mode=None)
-        alone.command(name)(function)
+        alone.command(name, cls=VerbCommand)(function)
         command = typer.main.get_command(alone)
         assert isinstance(command, TyperCommand)
         return command
