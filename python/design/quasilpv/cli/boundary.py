@@ -18,7 +18,9 @@ def boundary_command(
     asked: Question,
     *,
     over: Annotated[str, typer.Option("--over", metavar="NAME=FROM:TO", help="The parameter and its range.")],
-    tolerance: Annotated[float, typer.Option("--tolerance", help="Relative width to stop at.")] = RELATIVE_TOLERANCE,
+    tolerance: Annotated[
+        float, typer.Option("--tolerance", min=1e-12, max=1.0, help="Relative width to stop at.")
+    ] = RELATIVE_TOLERANCE,
     json: JsonOption = False,
 ) -> int:
     """Bisect for the limit of feasibility; the feasible side is proved in exact arithmetic.

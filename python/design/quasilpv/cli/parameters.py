@@ -20,6 +20,9 @@ from quasilpv.studies.region import Axis
 
 Result = TypeVar("Result")
 
+MOST_POINTS = 10_000
+"""Of an axis of a map."""
+
 SystemArgument: TypeAlias = Annotated[
     str,
     typer.Argument(
@@ -133,8 +136,8 @@ def axis(text: str, option: str) -> Axis:
         InputError: another form, or a number of points that is not whole.
     """
     name, numbers = _named_range(text, option, 3)
-    if not numbers[2].is_integer():
-        raise InputError("command line", option, text, "a whole number of points")
+    if not (numbers[2].is_integer() and numbers[2] <= MOST_POINTS):
+        raise InputError("command line", option, text, f"a whole number of points, at most {MOST_POINTS}")
     return Axis(name, numbers[0], numbers[1], int(numbers[2]))
 
 

@@ -19,6 +19,8 @@ from quasilpv.studies.engines import in_processes, on_cluster
 from quasilpv.studies.question import Question
 from quasilpv.studies.region import Map, Region, counts
 
+MOST_PROCESSES = 1024
+
 
 @asks_one_question
 def region_command(
@@ -45,8 +47,8 @@ def region_command(
       design region ex-I.1 --condition II.6 --x a=-8:8:17 --y b=-20:20:41
     """
     across, up = axis(x, "--x"), axis(y, "--y")
-    if processes is not None and processes < 1:
-        raise InputError("command line", "--processes", processes, "at least 1")
+    if processes is not None and not 1 <= processes <= MOST_PROCESSES:
+        raise InputError("command line", "--processes", processes, f"1 to {MOST_PROCESSES}")
     solver = on_cluster(dask) if dask else in_processes(processes or os.cpu_count() or 1)
     claim_folder(out)
     memory = Checkpoint(out, asked, (across.name, up.name))

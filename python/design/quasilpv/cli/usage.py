@@ -30,7 +30,7 @@ def usage_error(error: typer.TyperException) -> InputError:
 
 
 def require_values(arguments: Sequence[str]) -> None:
-    """Refuse what looks like a value and is none: ``--out ""`` or ``--out=``, often a variable of a shell that is unset.
+    """Refuse what stands for a value and is none: ``--out ""`` or ``--out=``, often an unset variable of a shell.
 
     Raises:
         InputError: an argument, or the value of an option, is empty.

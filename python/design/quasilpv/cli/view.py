@@ -41,7 +41,7 @@ def view_command(
         typer.Option("--scenario", metavar="FILE", help="Live: whose plant is drawn.  [default: the robot's]"),
     ] = None,
     timeout_s: Annotated[
-        float, typer.Option("--timeout-s", min=0.0, help="Live: wait so long for the first sample.")
+        float, typer.Option("--timeout-s", min=0.0, max=86400.0, help="Live: wait so long for the first sample.")
     ] = 60.0,
     port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Of the page; 0: any free one.")] = DEFAULT_PORT,
     at: Annotated[
