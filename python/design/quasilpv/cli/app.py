@@ -14,6 +14,7 @@ import typer
 
 from quasilpv import __version__
 from quasilpv.cli.console import print_json
+from quasilpv.cli.environment import settle
 from quasilpv.cli.stopping import Stopped, raise_when_stopped
 from quasilpv.cli.streams import ReaderLeftError, answered, guarded_streams, open_missing_streams
 from quasilpv.cli.usage import usage_error
@@ -140,6 +141,7 @@ def _run(arguments: Sequence[str]) -> int:
 def main() -> None:
     """Entry point of the command ``design``."""
     open_missing_streams()
+    settle()
     raise_when_stopped()
     try:
         code = run(sys.argv[1:])

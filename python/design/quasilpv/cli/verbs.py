@@ -14,6 +14,7 @@ from typing import Any
 import typer
 from typer.core import CompletionItem, TyperCommand, TyperGroup  # type: ignore[attr-defined]
 
+from quasilpv.cli.environment import away_from_here
 from quasilpv.cli.usage import require_bounded, require_values
 from quasilpv.errors import InputError, one_of
 
@@ -44,7 +45,9 @@ class Verb:
 
     def load(self, name: str) -> TyperCommand:
         """Import the verb and build its command."""
-        function = getattr(import_module(f"quasilpv.cli.{self.module}"), f"{self.module}_command")
+        with away_from_here():
+            module = import_module(f"quasilpv.cli.{self.module}")
+        function = getattr(module, f"{self.module}_command")
         alone = typer.Typer(add_completion=False, rich_markup_mode=None)
         alone.command(name, cls=VerbCommand)(function)
         command = typer.main.get_command(alone)

@@ -75,8 +75,12 @@ _PARAMETERS: dict[Any, Any] = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """The style as a context: figures must be built and saved inside it (matplotlib resolves some defaults late)."""
-    with mpl.rc_context(_PARAMETERS):
+    """The style as a context: figures must be built and saved inside it (matplotlib resolves some defaults late).
+
+    It begins at the defaults of matplotlib, whatever its user has set.
+    """
+    defaults: dict[Any, Any] = {name: value for name, value in mpl.rcParamsDefault.items() if name != "backend"}
+    with mpl.rc_context({**defaults, **_PARAMETERS}):
         yield
 
 
