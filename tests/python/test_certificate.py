@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from flint import fmpq, fmpq_mat
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from quasilpv.artifact.canonical import canonical_json, with_hash
@@ -309,6 +309,7 @@ def pivots(exact: fmpq_mat) -> list[Fraction]:
 
 
 @given(seeds, st.integers(1, 5))
+@example(3353057, 2)
 def test_when_a_matrix_is_decided_exactly_expect_the_pivots_to_agree_whatever_the_units(seed: int, size: int) -> None:
     rng = np.random.default_rng(seed)
     factor = rng.integers(-3, 4, size=(size, size))
@@ -325,9 +326,27 @@ def test_when_a_matrix_is_decided_exactly_expect_the_pivots_to_agree_whatever_th
     if abs(claim.margin) > 1e-9:
         assert (claim.margin > 0) is expected
     unscaled = Claim.positive("it", matrix(square))
-    assert claim.margin == pytest.approx(unscaled.margin, abs=1e-9)
+    assert claim.margin == unscaled.margin
     diagonal = [scaled_to_unit_diagonal(exact)[k, k] for k in range(size)]
     assert all(entry <= 0 or fmpq(1, 4) < entry < 4 for entry in diagonal)
+
+
+@given(seeds, st.integers(1, 5), st.integers(-400, 400))
+def test_when_rows_and_columns_are_in_other_units_expect_the_same_margin_even_beyond_double(
+    seed: int, size: int, exponent: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    square = rng.integers(-3, 4, size=(size, size)) + int(rng.integers(0, 8)) * np.eye(size, dtype=int)
+    units = [Fraction(10) ** (exponent * int(e)) * int(s) for e, s in rng.integers(1, 4, size=(size, 2))]
+    other = [[units[i] * int(square[i, j]) * units[j] for j in range(size)] for i in range(size)]
+    margin = Claim.positive("it", matrix(square.tolist())).margin
+    assert Claim.positive("it", matrix(other)).margin == margin
+    diagonal = square.diagonal()
+    if np.all(diagonal > 0):
+        unit_diagonal = (square + square.T) / 2 / np.sqrt(np.outer(diagonal, diagonal))
+        assert margin == pytest.approx(max(-1.0, np.linalg.eigvalsh(unit_diagonal)[0]), abs=1e-12)
+    else:
+        assert margin == -1.0
 
 
 def test_when_a_matrix_is_singular_or_not_symmetric_expect_no_certificate() -> None:

@@ -69,7 +69,8 @@ def test_when_expressions_are_compiled_expect_the_values_sympy_computes_to_30_di
     substitution = dict(zip(itertools.chain(THETA, OMEGA, RATE), map(sp.Float, state.ravel()), strict=True))
     for expression, value in zip(expressions, values, strict=True):
         exact = complex(sp.N(sp.sympify(expression).subs(substitution), 30))
-        assert exact.imag == 0.0
+        # A square root may leave an imaginary part that is rounding; 30 digits were asked for.
+        assert abs(exact.imag) <= 1e-25 * max(1.0, abs(exact))
         # Rounding is relative to the intermediate values, which nested squares of operands up to 3 can make large.
         assert value == pytest.approx(exact.real, rel=1e-9, abs=1e-9)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from quasilpv.certificate.exact_matrices import is_positive_definite, scaled_to_unit_diagonal
+from quasilpv.certificate.exact_matrices import is_positive_definite
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class Claim:
         name: which inequality, e.g. ``"observer: pole disk"``.
         holds: the exact verdict.
         margin: smallest eigenvalue once rows and columns are scaled to a unit diagonal, in double arithmetic and at
-            least -1: how far from the edge, for people, whatever the units.
+            least -1: how far from the edge, for people, and the same in whatever units.
     """
 
     name: str
@@ -43,15 +44,24 @@ def all_positive(name: str, numbers: Iterable[fmpq]) -> Claim:
 
 
 def _margin(exact: fmpq_mat) -> float:
-    """Smallest eigenvalue at unit diagonal; -1 if a diagonal entry is not positive."""
-    if any(exact[k, k] <= 0 for k in range(exact.nrows())):
+    """Smallest eigenvalue of the symmetric part at unit diagonal; -1 if a diagonal entry is not positive.
+
+    The squares ``m_ij^2 / (m_ii m_jj)`` are formed exactly. Units of rows and columns cancel in them: the result does
+    not depend on units, not in its last digit either, and entries of any size, in double or beyond, are in range.
+    """
+    table = exact.table()
+    size = len(table)
+    if any(table[k][k] <= 0 for k in range(size)):
         return -1.0
-    # In a positive definite matrix of this scaling no entry exceeds 2: larger ones need not be told apart.
-    low, high = fmpq(-4), fmpq(4)
-    bounded = [[min(max(entry, low), high) for entry in row] for row in scaled_to_unit_diagonal(exact).table()]
-    values = np.array([[int(entry.p) / int(entry.q) for entry in row] for row in bounded])
-    unit = 1.0 / np.sqrt(values.diagonal())
-    values = (values + values.T) / 2.0 * np.outer(unit, unit)
+    values = np.eye(size)
+    for i in range(size):
+        for j in range(i):
+            entry = (table[i][j] + table[j][i]) / 2
+            square = entry * entry / (table[i][i] * table[j][j])
+            if square >= 4:  # an entry r next to two ones: an eigenvalue of 1 - |r| <= -1 at the most
+                return -1.0
+            root = math.sqrt(int(square.p) / int(square.q))
+            values[i, j] = values[j, i] = root if entry > 0 else -root
     return max(-1.0, float(np.linalg.eigvalsh(values)[0]))
 
 

@@ -82,7 +82,7 @@ def is_symmetric(square: fmpq_mat) -> bool:
 
 
 def scaled_to_unit_diagonal(square: fmpq_mat) -> fmpq_mat:
-    """``S M S`` with S a diagonal of powers of two that brings every positive diagonal entry into [1/2, 2).
+    """``S M S`` with S a diagonal of powers of two that brings every positive diagonal entry into (1/2, 4).
 
     A congruence, so it changes no sign of an eigenvalue; it takes units out of the numbers and keeps them short.
     """

@@ -271,12 +271,14 @@ def compile_family(build: Callable[[Mapping[str, float]], Problem], base: Mappin
 
 
 def rounded(point: FloatArray) -> FloatArray:
-    """A point with its entries rounded to `CANDIDATE_BITS` bits below the largest one; exact in double."""
-    largest = float(np.max(np.abs(point), initial=0.0))
-    if largest == 0.0:
-        return point
-    unit = 2.0 ** (np.frexp(largest)[1] - CANDIDATE_BITS)
-    return np.asarray(np.round(point / unit) * unit)
+    """A finite point with its entries rounded to `CANDIDATE_BITS` bits below the largest one; exact in double.
+
+    The unit itself need not be a double: it is a power of two, applied to the exponents.
+    """
+    _, exponent = np.frexp(np.max(np.abs(point), initial=0.0))
+    steps = np.round(np.ldexp(point, CANDIDATE_BITS - exponent))
+    most = 2.0**CANDIDATE_BITS - (exponent == np.finfo(float).maxexp)  # the largest doubles would round to infinity
+    return np.asarray(np.ldexp(np.clip(steps, -most, most), exponent - CANDIDATE_BITS))
 
 
 def lattice(base: Mapping[str, float]) -> list[dict[str, float]]:
