@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 #include <nvector/nvector_serial.h>
-#include <sundials/sundials_context.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "arm_fixtures.hpp"
+#include "sundials_compat.hpp"
 
 namespace quasilpv {
 namespace {
@@ -27,7 +27,7 @@ VectorXd values(N_Vector v) { return Eigen::Map<VectorXd>(N_VGetArrayPointer(v),
 
 class IdaKernels : public ::testing::Test {
  protected:
-  IdaKernels() { SUNContext_Create(nullptr, &context_); }
+  IdaKernels() { SUNContext_Create(SUN_COMM_NULL, &context_); }
   ~IdaKernels() override {
     for (const N_Vector v : vectors_) {
       N_VDestroy(v);
@@ -123,8 +123,8 @@ TEST_F(SmallLinearSolver, solves_random_systems_and_those_that_need_row_exchange
     const VectorXd expected = uniform.vector(kSize, 1.0);
     matrix() = a;
     Eigen::Map<VectorXd>(N_VGetArrayPointer(right_), kSize) = a * expected;
-    ASSERT_EQ(SUNLinSolSetup(solver_, matrix_), SUNLS_SUCCESS);
-    ASSERT_EQ(SUNLinSolSolve(solver_, matrix_, solution_, right_, 0.0), SUNLS_SUCCESS);
+    ASSERT_EQ(SUNLinSolSetup(solver_, matrix_), SUN_SUCCESS);
+    ASSERT_EQ(SUNLinSolSolve(solver_, matrix_, solution_, right_, 0.0), SUN_SUCCESS);
     EXPECT_LT((a * values(solution_) - a * expected).cwiseAbs().maxCoeff(), 1e-14);
     EXPECT_LT((values(solution_) - expected).cwiseAbs().maxCoeff(), 1e-9);
   }
@@ -141,7 +141,7 @@ TEST_F(SmallLinearSolver, when_the_matrix_is_singular_or_not_a_number_expect_a_r
 
 TEST_F(SmallLinearSolver, the_matrix_is_cleared_for_ida) {
   matrix().setOnes();
-  EXPECT_EQ(SUNMatZero(matrix_), SUNMAT_SUCCESS);
+  EXPECT_EQ(SUNMatZero(matrix_), SUN_SUCCESS);
   EXPECT_EQ(matrix().cwiseAbs().maxCoeff(), 0.0);
 }
 

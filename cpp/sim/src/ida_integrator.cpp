@@ -1,7 +1,6 @@
 #include "quasilpv/ida_integrator.hpp"
 
 #include <ida/ida.h>
-#include <sundials/sundials_context.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 
 #include "ida_kernels.hpp"
 #include "quasilpv/errors.hpp"
+#include "sundials_compat.hpp"
 
 namespace quasilpv {
 namespace {
@@ -87,7 +87,7 @@ int jacobian(sunrealtype t, sunrealtype c_j, N_Vector y, N_Vector y_dot, N_Vecto
 
 SUNContext make_context() {
   SUNContext context = nullptr;
-  if (SUNContext_Create(nullptr, &context) != 0) {
+  if (SUNContext_Create(SUN_COMM_NULL, &context) != 0) {
     throw PlantError("SUNContext_Create failed");
   }
   return context;
@@ -95,22 +95,21 @@ SUNContext make_context() {
 
 }  // namespace
 
-// Members are destroyed in reverse order: the context last, as SUNDIALS demands.
+// Members are destroyed in reverse order: the context after all that was created in it, as SUNDIALS demands.
 struct IdaIntegrator::Solver {
   Solver(const Plant& the_plant, const IdaOptions& options);
 
   const Plant& plant;
+  std::string message;  // IDA's own words about its last failure
   Owner<SUNContext, FreeContext> context;
   Owner<N_Vector, FreeVector> y, y_dot;
   Owner<SUNMatrix, FreeMatrix> matrix;
   Owner<SUNLinearSolver, FreeLinearSolver> linear_solver;
   std::unique_ptr<void, FreeIda> ida;
-  std::string message;  // IDA's own words about its last failure
   IdaStatistics statistics;
 
   [[noreturn]] void fail(int flag, double from_s, double reached_s, double to_s) const;
   void count();
-  static void keep_message(int code, const char* module, const char* function, char* text, void* solver);
 };
 
 IdaIntegrator::Solver::Solver(const Plant& the_plant, const IdaOptions& options) : plant(the_plant) {
@@ -123,7 +122,7 @@ IdaIntegrator::Solver::Solver(const Plant& the_plant, const IdaOptions& options)
   linear_solver.reset(require(make_small_linear_solver(y.get(), matrix.get(), context.get()), "SUNLinSol_Dense"));
   ida.reset(require(IDACreate(context.get()), "IDACreate"));
 
-  check(IDASetErrHandlerFn(ida.get(), keep_message, this), "IDASetErrHandlerFn");
+  check(keep_messages(context.get(), ida.get(), message), "keep_messages");
   check(IDAInit(ida.get(), residual, 0.0, y.get(), y_dot.get()), "IDAInit");
   // IDA hands the pointer back as it got it; the callbacks restore the const.
   check(IDASetUserData(ida.get(), const_cast<Plant*>(&plant)), "IDASetUserData");
@@ -137,11 +136,6 @@ IdaIntegrator::Solver::Solver(const Plant& the_plant, const IdaOptions& options)
   check(IDASetDeltaCjLSetup(ida.get(), kStaleMatrix), "IDASetDeltaCjLSetup");
   check(IDASetMinStep(ida.get(), kShortestStep), "IDASetMinStep");
   check(IDASetMaxNumSteps(ida.get(), kMaxSteps), "IDASetMaxNumSteps");
-}
-
-void IdaIntegrator::Solver::keep_message(int /*code*/, const char* /*module*/, const char* /*function*/, char* text,
-                                         void* solver) {
-  static_cast<Solver*>(solver)->message = text;
 }
 
 void IdaIntegrator::Solver::fail(int flag, double from_s, double reached_s, double to_s) const {

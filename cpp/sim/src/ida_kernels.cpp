@@ -7,6 +7,8 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "sundials_compat.hpp"
+
 namespace quasilpv {
 namespace {
 
@@ -75,7 +77,7 @@ MatrixView view(SUNMatrix matrix) {
 
 int zero(SUNMatrix matrix) {
   view(matrix).setZero();
-  return SUNMAT_SUCCESS;
+  return SUN_SUCCESS;
 }
 
 // Gaussian elimination, L (without its unit diagonal) and U in place of the matrix.
@@ -89,10 +91,10 @@ int factorise(SUNLinearSolver solver, SUNMatrix matrix) {
     const double largest = a.col(k).tail(below + 1).cwiseAbs().maxCoeff(&pivot);
     pivot += k;
     if (!(largest > 0.0)) {
-      content->last_flag = k + 1;
+      content->last_flag = static_cast<sunindextype>(k + 1);
       return SUNLS_LUFACT_FAIL;
     }
-    content->pivots[k] = pivot;
+    content->pivots[k] = static_cast<sunindextype>(pivot);
     if (pivot != k) {
       a.row(k).swap(a.row(pivot));
     }
@@ -103,8 +105,8 @@ int factorise(SUNLinearSolver solver, SUNMatrix matrix) {
       }
     }
   }
-  content->last_flag = SUNLS_SUCCESS;
-  return SUNLS_SUCCESS;
+  content->last_flag = SUN_SUCCESS;
+  return SUN_SUCCESS;
 }
 
 int solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector solution, N_Vector right_side, double /*tolerance*/) {
@@ -123,7 +125,7 @@ int solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector solution, N_Vector 
     x[k] /= lu(k, k);
     x.head(k) -= x[k] * lu.col(k).head(k);
   }
-  return SUNLS_SUCCESS;
+  return SUN_SUCCESS;
 }
 
 }  // namespace
