@@ -27,7 +27,7 @@ class MovingWindow {
   /// RT-SAFE (bounded, no allocation, no lock, no throw).
   void reset(const double* weight) noexcept {
     for (std::size_t row = 0; row <= periods_; ++row) {
-      std::copy_n(weight, size_, at(row));
+      copy(weight, at(row));
     }
     for (std::size_t i = 0; i < size_; ++i) {
       sum_[i] = static_cast<double>(periods_) * weight[i];
@@ -44,8 +44,8 @@ class MovingWindow {
     newest_ = next(newest_);
     double* const leaving = at(newest_);  // the beginning of the window so far
     if (periods_ == 0) {
-      std::copy_n(weight, size_, leaving);
-      std::copy_n(weight, size_, mean_.data());
+      copy(weight, leaving);
+      copy(weight, mean_.data());
       return;
     }
     const bool full = ++count_ == periods_;
@@ -70,6 +70,13 @@ class MovingWindow {
   const double* beginning() const noexcept { return ring_.data() + next(newest_) * size_; }
 
  private:
+  // A loop, not std::copy_n: with a window of one weight known to it, g++ 14 takes the size for one that may be larger
+  // and refuses the copy as one beyond the array (-Warray-bounds), which is a false alarm.
+  void copy(const double* weight, double* to) const noexcept {
+    for (std::size_t i = 0; i < size_; ++i) {
+      to[i] = weight[i];
+    }
+  }
   double* at(std::size_t row) noexcept { return ring_.data() + row * size_; }
   std::size_t next(std::size_t row) const noexcept { return row == periods_ ? 0 : row + 1; }
 
