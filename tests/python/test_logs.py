@@ -30,6 +30,7 @@ from quasilpv.synthesis import Specification
 from quasilpv.systems.registry import robot, robots
 from quasilpv.telemetry import LOG_NAME, Event, RunLog, latest_log, read_events, read_log, write_events
 from quasilpv.telemetry.codes import event_in_words
+from quasilpv.telemetry.log import point_to
 from quasilpv.telemetry.mcap_export import as_json, json_schema
 from quasilpv.telemetry.message_types import CHANNELS, message_type, parse_definition
 from quasilpv.telemetry.replay import replay
@@ -144,23 +145,95 @@ def test_when_lcm_itself_writes_a_log_expect_it_read(tmp_path: Path) -> None:
     assert decoded["command"].refused == {"wrong size": 1}
 
 
-@given(cut=st.integers(1, 199), junk=st.binary(min_size=1, max_size=60))
-def test_when_a_log_is_cut_or_foreign_bytes_follow_expect_one_line_or_whole_events(
-    tmp_path_factory: pytest.TempPathFactory, cut: int, junk: bytes
+FOUR_EVENTS = [Event(k, "QLPV_X", bytes(range(16))) for k in range(4)]
+EVENT_BYTES = 50
+
+
+@pytest.fixture(scope="module")
+def four(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_events(tmp_path_factory.mktemp("four") / "four.lcmlog", FOUR_EVENTS)
+
+
+@pytest.mark.parametrize("lost", [b"", bytes(1), bytes(4096)], ids=["", "a zero", "a page of zeros"])
+def test_when_a_log_is_cut_anywhere_expect_every_whole_event_and_how_much_is_left_out(
+    lost: bytes, four: Path, tmp_path: Path
 ) -> None:
-    path = tmp_path_factory.mktemp("cut") / "cut.lcmlog"
-    events = [Event(k, "QLPV_X", bytes(16)) for k in range(4)]
-    content = write_events(path, events).read_bytes()
-    assert len(content) == 200
-    path.write_bytes(content[:cut])
-    if cut % 50:
-        with pytest.raises(InputError, match=rf"event {cut // 50}: got the end of the file"):
-            list(read_events(path))
+    content, path = four.read_bytes(), tmp_path / "cut.lcmlog"
+    assert len(content) == len(FOUR_EVENTS) * EVENT_BYTES
+    for cut in range(1, len(content)):
+        path.write_bytes(content[:cut] + (lost if cut % EVENT_BYTES == 0 else b""))
+        if cut < EVENT_BYTES:
+            with pytest.raises(InputError, match="event 0: got the end of the file"):
+                read_events(path)
+            continue
+        log = read_events(path)
+        assert list(log) == FOUR_EVENTS[: cut // EVENT_BYTES]
+        assert log.incomplete_bytes == (cut % EVENT_BYTES or len(lost))
+
+
+@given(place=st.integers(0, 4), junk=st.binary(min_size=1, max_size=60))
+def test_when_other_bytes_are_in_a_log_expect_a_line_with_the_event(
+    four: Path, tmp_path_factory: pytest.TempPathFactory, place: int, junk: bytes
+) -> None:
+    content, path = four.read_bytes(), tmp_path_factory.mktemp("junk") / "junk.lcmlog"
+    at = place * EVENT_BYTES
+    path.write_bytes(content[:at] + junk + content[at:])
+    is_unwritten_space = place == len(FOUR_EVENTS) and not any(junk)
+    begins_an_event = place == len(FOUR_EVENTS) and b"\xed\xa1\xda\x01".startswith(junk[:4])
+    if is_unwritten_space or begins_an_event:
+        assert list(read_events(path)) == FOUR_EVENTS
     else:
-        assert list(read_events(path)) == events[: cut // 50]
-    path.write_bytes(content + junk)
-    with pytest.raises(InputError, match="event 4"):
-        list(read_events(path))
+        # Junk that begins like an event may borrow the bytes of the next one: then it is found one event later.
+        with pytest.raises(InputError, match=f"event ({place}|{place + 1})"):
+            read_events(path)
+
+
+@given(event=st.integers(0, 3), place=st.integers(0, 27), value=st.integers(0, 255))
+def test_when_a_byte_of_the_head_of_an_event_is_another_expect_a_line_or_every_other_event(
+    four: Path, tmp_path_factory: pytest.TempPathFactory, event: int, place: int, value: int
+) -> None:
+    content, path = bytearray(four.read_bytes()), tmp_path_factory.mktemp("head") / "head.lcmlog"
+    content[event * EVENT_BYTES + place] = value
+    path.write_bytes(content)
+    try:
+        found = list(read_events(path))
+    except InputError as refused:
+        message = str(refused)
+    else:
+        message = ""
+    if message:
+        assert f"event {event}" in message or f"event {event + 1}" in message
+        return
+    whole = event if len(found) < len(FOUR_EVENTS) else len(FOUR_EVENTS)
+    assert len(found) == whole
+    kept = [k for k in range(whole) if k != event]
+    assert [found[k] for k in kept] == [FOUR_EVENTS[k] for k in kept]
+    if whole < len(FOUR_EVENTS):  # only the last one can claim to go on beyond the end of the file
+        assert event == len(FOUR_EVENTS) - 1
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.999])
+def test_when_a_recording_was_cut_off_expect_a_warning_and_everything_that_is_whole(
+    share: float, tracked: tuple[TrackResult, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = read_log(tracked[1])
+    ends = np.cumsum([28 + len(event.channel) + len(event.data) for event in read_events(tracked[1])])
+    content = tracked[1].read_bytes()
+    cut = int(share * len(content))
+    assert cut not in ends
+    (tmp_path / "cut.lcmlog").write_bytes(content[:cut])
+    assert run(["log", "info", str(tmp_path / "cut.lcmlog"), "--json"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err.startswith(f"warning: {tmp_path / 'cut.lcmlog'}: ")
+    assert captured.err.count("\n") == 1
+    info, kept = json.loads(captured.out), int(np.searchsorted(ends, cut, side="right"))
+    assert info["incomplete_bytes"] == cut - (ends[kept - 1] if kept else 0)
+    log = read_log(tmp_path / "cut.lcmlog")
+    assert kept == 4 + sum(messages.records.size for messages in log.channels.values())
+    for channel, messages in log.channels.items():
+        expected = whole.channels[channel].records[: messages.records.size]
+        assert messages.records.tobytes() == expected.tobytes()
+    assert replay(log).first_difference is None
 
 
 def test_when_a_run_is_read_back_from_its_log_expect_every_sample_and_number(
@@ -296,6 +369,35 @@ def test_when_the_last_log_is_asked_for_expect_the_newest_and_without_one_a_line
         stamp = path.stat().st_mtime - age
         os.utime(path, (stamp, stamp))
     assert latest_log(tmp_path) == new
+
+
+@pytest.mark.parametrize("name", [b"elsewhere", b"\xff\xfe elsewhere\n"], ids=repr)
+def test_when_the_last_run_was_written_elsewhere_expect_it_found_and_once_it_is_gone_said(
+    name: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    log = write_events(Path(os.fsdecode(name)) / "run.lcmlog", [Event(0, "QLPV_RUN", b"{}")])
+    point_to(log)
+    assert latest_log() == log.absolute()
+    newer = write_events(Path("out") / "run.lcmlog", [Event(0, "QLPV_RUN", b"{}")])
+    os.utime(newer, ns=(0, log.stat().st_mtime_ns + 1))
+    assert latest_log() == newer
+    newer.unlink()
+    log.unlink()
+    with pytest.raises(InputError, match=f"under {tmp_path}/out, and no longer ") as error:
+        latest_log()
+    assert "elsewhere" in str(error.value)
+
+
+def test_when_a_run_is_tracked_into_another_folder_expect_it_to_be_the_last(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    elsewhere = tmp_path.with_name(f"{tmp_path.name}-elsewhere")
+    assert run(["track", "stabilise-arm2", "--controller", "pid", "-o", str(elsewhere), "--json"]) == 0
+    capsys.readouterr()
+    assert run(["log", "info", "LAST", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["log"] == str(elsewhere / "stabilise-arm2" / "pid" / LOG_NAME)
 
 
 def test_when_a_log_is_inspected_expect_counts_rates_and_the_hash(

@@ -34,7 +34,7 @@ class Action(StrEnum):
 
 def log_command(
     action: Annotated[Action, typer.Argument(metavar="ACTION", help="info, plot, replay or to-mcap.")],
-    log: Annotated[str, typer.Argument(metavar="LOG", help="A log, or LAST: the newest one under out.")],
+    log: Annotated[str, typer.Argument(metavar="LOG", help="A log, or LAST: that of the last run.")],
     *,
     artifact: LogArtifactOption = None,
     out: Annotated[
@@ -84,6 +84,7 @@ def _about(log: RunLog) -> dict[str, Any]:
         about |= {"artifact": log.artifact.name, "artifact_hash": log.artifact.hash}
     sessions = {session for messages in log.channels.values() for session in messages.records["session"].tolist()}
     about["sessions"] = sorted(sessions)
+    about["incomplete_bytes"] = log.incomplete_bytes
     about["telemetry_drops"] = int(telemetry.records["drops"].max(initial=0))
     return about
 

@@ -8,6 +8,7 @@ from typing import Annotated, TypeAlias
 import typer
 
 from quasilpv.artifact import read_artifact
+from quasilpv.cli.console import print_note
 from quasilpv.telemetry import RunLog, latest_log, read_log
 from quasilpv.telemetry.log import LAST
 
@@ -33,4 +34,9 @@ def open_log(text: str, artifact: Path | None) -> RunLog:
         InputError: it cannot be read, or it is of a run with another controller.
     """
     log = read_log(log_path(text))
+    if log.incomplete_bytes:
+        print_note(
+            f"warning: {log.source}: {log.incomplete_bytes} bytes of an event that was not written whole are left out; "
+            f"the last whole one is of sample {log.last_seq}"
+        )
     return log if artifact is None else log.require_artifact(read_artifact(artifact))

@@ -12,6 +12,8 @@ from quasilpv.cli.options import designed, sensors_of
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
 from quasilpv.figures.gallery import write_comparison, write_gallery
+from quasilpv.telemetry import LOG_NAME
+from quasilpv.telemetry.log import point_to
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Session:
 
     def run(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> TrackResult:
         """Design, if no controller is given, and run one variant in closed loop."""
-        return track(
+        result = track(
             experiment,
             self.controller(experiment, variant, steps),
             self.folder(experiment, variant),
@@ -51,6 +53,9 @@ class Session:
             variant=variant,
             log=self.log,
         )
+        if self.log:
+            point_to(self.folder(experiment, variant) / LOG_NAME)
+        return result
 
 
 def draw_results(results: Sequence[TrackResult], out: Path) -> None:

@@ -31,7 +31,7 @@ def view_command(
     *,
     log: Annotated[
         str | None,
-        typer.Option("--log", metavar="LOG", help=f"A log, or LAST: the newest one under out.  [default: {LAST}]"),
+        typer.Option("--log", metavar="LOG", help=f"A log, or LAST: that of the last run.  [default: {LAST}]"),
     ] = None,
     live: Annotated[bool, typer.Option("--live", help="Listen to a run instead; needs --artifact.")] = False,
     url: Annotated[str, typer.Option("--url", help="Live: LCM URL of the run.")] = DEFAULT_URL,

@@ -6,8 +6,10 @@ says how it was made. Messages follow the rules of ``docs/reference/messages.md`
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +23,7 @@ from quasilpv.artifact import Artifact
 from quasilpv.artifact.canonical import canonical_json, parse_document, parse_strict_json
 from quasilpv.artifact.strict_model import StrictModel, validate
 from quasilpv.errors import InputError
+from quasilpv.files import write_atomically
 from quasilpv.scenarios import Scenario
 from quasilpv.telemetry.event_log import SUFFIX, Event, read_events
 from quasilpv.telemetry.message_types import CHANNELS, MessageType, Records, channel_type
@@ -31,6 +34,8 @@ Mode: TypeAlias = Literal["in-process", "lockstep", "realtime"]
 LOG_NAME = f"run{SUFFIX}"
 LAST = "LAST"
 RUNS_FOLDER = Path("out")
+POINTER_NAME = "last-log"
+"""In `RUNS_FOLDER`: the path of the log of the last run, wherever that was written."""
 
 HEADER, ARTIFACT, TRAJECTORY, SCENARIO = "QLPV_RUN", "QLPV_ARTIFACT", "QLPV_TRAJECTORY", "QLPV_SCENARIO"
 DOCUMENT_CHANNELS = (HEADER, ARTIFACT, TRAJECTORY, SCENARIO)
@@ -106,12 +111,14 @@ class RunLog:
         documents: JSON bytes of those of `DOCUMENT_CHANNELS` it holds.
         channels: by name, those of `message_types.CHANNELS`; empty ones too.
         foreign: how many events there are on every other channel.
+        incomplete_bytes: behind the last whole event, see `EventLog`.
     """
 
     source: str
     documents: Mapping[str, bytes]
     channels: Mapping[str, Messages]
     foreign: Mapping[str, int] = field(default_factory=dict)
+    incomplete_bytes: int = 0
 
     def __getitem__(self, channel: str) -> Messages:
         """The messages of a channel, given without its prefix, e.g. ``"telemetry"``."""
@@ -182,12 +189,13 @@ def read_log(path: Path | str) -> RunLog:
     """Read the log of a run.
 
     Raises:
-        InputError: the file cannot be read, is no LCM log, is truncated, or has no event of this project.
+        InputError: the file cannot be read, is no LCM log, or has no event of this project.
     """
     packets: dict[str, list[Event]] = {channel: [] for channel in CHANNELS}
     documents: dict[str, bytes] = {}
     foreign: Counter[str] = Counter()
-    for event in read_events(path):
+    read = read_events(path)
+    for event in read:
         if event.channel in packets:
             packets[event.channel].append(event)
         elif event.channel in DOCUMENT_CHANNELS:
@@ -197,19 +205,31 @@ def read_log(path: Path | str) -> RunLog:
     if not documents and not any(packets.values()):
         raise InputError(str(path), "channels", ", ".join(foreign) or "none", f"at least one of {', '.join(CHANNELS)}")
     channels = {channel: _decode(channel_type(channel), events) for channel, events in packets.items()}
-    return RunLog(str(path), documents, channels, dict(foreign))
+    return RunLog(str(path), documents, channels, dict(foreign), read.incomplete_bytes)
+
+
+def point_to(log: Path, folder: Path = RUNS_FOLDER) -> None:
+    """Keep where a log was written, for `latest_log`; where there is no place for that, nothing is kept."""
+    with suppress(InputError):
+        write_atomically({folder / POINTER_NAME: os.fsencode(os.path.abspath(log)) + b"\n"})
 
 
 def latest_log(folder: Path = RUNS_FOLDER) -> Path:
-    """The log that was written last anywhere below a folder.
+    """The log that was written last, anywhere below a folder or where the pointer in it says.
 
     Raises:
         InputError: there is none.
     """
-    logs = list(folder.rglob(f"*{SUFFIX}"))
+    logs = {path: path.stat().st_mtime_ns for path in folder.rglob(f"*{SUFFIX}") if path.is_file()}
+    missing = ""
+    with suppress(OSError):
+        elsewhere = Path(os.fsdecode((folder / POINTER_NAME).read_bytes().removesuffix(b"\n")))
+        missing = f", and no longer {elsewhere}"
+        logs[elsewhere] = elsewhere.stat().st_mtime_ns
     if not logs:
-        raise InputError("command line", LAST, f"no *{SUFFIX} under {folder}", "a run before it, e.g. design track")
-    return max(logs, key=lambda path: path.stat().st_mtime_ns)
+        looked = f"no *{SUFFIX} under {os.path.abspath(folder)}{missing}"
+        raise InputError("command line", LAST, looked, "a run before it, e.g. design track")
+    return max(logs, key=lambda path: logs[path])
 
 
 def _decode(kind: MessageType, events: list[Event]) -> Messages:
