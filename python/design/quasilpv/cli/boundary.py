@@ -8,7 +8,7 @@ import typer
 
 from quasilpv.cli.console import JsonOption, print_json
 from quasilpv.cli.parameters import asks_one_question, interval
-from quasilpv.studies import find_boundary
+from quasilpv.studies import Evidence, find_boundary
 from quasilpv.studies.boundary import RELATIVE_TOLERANCE
 from quasilpv.studies.question import Question
 
@@ -40,8 +40,9 @@ def boundary_command(
     elif found.infeasible_from is None:
         print(f"feasible, proved, up to {searched.name} = {found.certified_up_to:.6g}; no infeasible point was found")
     else:
+        sure = "proved" if found.infeasible_evidence is Evidence.PROVED else "numerically"
         print(
-            f"{searched.name} = {found.value:.5g}: feasible, proved, up to {found.certified_up_to:.6g}; "
-            f"infeasible, numerically, from {found.infeasible_from:.6g} ({found.evaluations} points)"
+            f"{searched.name} = {found.value:.6g}: feasible, proved, up to {found.certified_up_to:.7g}; "
+            f"infeasible, {sure}, from {found.infeasible_from:.7g} ({found.evaluations} points)"
         )
     return 1 if found.certified_up_to is None else 0

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from quasilpv.errors import InputError
-from quasilpv.studies.answer import Answer, Verdict
+from quasilpv.studies.answer import Answer, Evidence, Verdict
 from quasilpv.studies.question import Question, Sweep
 from quasilpv.systems.catalogue import system_kind
 
-RELATIVE_TOLERANCE = 1e-3
+RELATIVE_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,15 @@ class Boundary:
 
     Attributes:
         certified_up_to: the last point at which feasibility is proved; None if neither end is feasible.
-        infeasible_from: the nearest point at which a solver found infeasibility; None if there is none.
+        infeasible_from: the nearest point that is infeasible; None if there is none.
         evaluations: points that were solved.
+        infeasible_evidence: whether that is proved, or what a solver found; None without such a point.
     """
 
     certified_up_to: float | None
     infeasible_from: float | None
     evaluations: int
+    infeasible_evidence: Evidence | None = None
 
     @property
     def value(self) -> float | None:
@@ -55,6 +57,7 @@ class Boundary:
             "value": self.value,
             "certified_up_to": self.certified_up_to,
             "infeasible_from": self.infeasible_from,
+            "infeasible_evidence": self.infeasible_evidence and self.infeasible_evidence.value,
             "evaluations": self.evaluations,
         }
 
@@ -90,8 +93,8 @@ def find_boundary(question: Question, over: Interval, tolerance: float = RELATIV
     ends = {value: verdict(value) for value in (over.start, over.end)}
     feasible = [value for value, found in ends.items() if found is Verdict.FEASIBLE]
     if len(feasible) != 1:
-        inside = over.end if feasible else None
-        return Boundary(inside, None if feasible else over.start, len(answers))
+        refused = [value for value, found in ends.items() if found is Verdict.INFEASIBLE]
+        return _found(over.end if feasible else None, refused[0] if refused else None, answers)
     good, bad = feasible[0], next(value for value in ends if value != feasible[0])
     smallest = tolerance**2 * abs(over.end - over.start)
     worst = bad if ends[bad] is Verdict.INFEASIBLE else None
@@ -103,4 +106,10 @@ def find_boundary(question: Question, over: Interval, tolerance: float = RELATIV
         else:
             bad = middle
             worst = middle if found is Verdict.INFEASIBLE else worst
-    return Boundary(good, worst, len(answers))
+    return _found(good, worst, answers)
+
+
+def _found(good: float | None, worst: float | None, answers: dict[float, Answer]) -> Boundary:
+    """A boundary between points that were answered."""
+    evidence = answers[worst].evidence if worst is not None else None
+    return Boundary(good, worst, len(answers), evidence)

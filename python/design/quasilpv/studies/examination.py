@@ -4,8 +4,8 @@
 2. A frozen mode that refutes every solution (`refutation`): *infeasible, proved*.
 3. The inequalities again in other units (`quasilpv.polytopes.scaling.ladder`), until one step is verified. What holds
    in other units holds: a statement is built for the rescaled system, exactly, and its law and Lyapunov function are
-   brought back exactly. They are the same inequalities: every condition is covariant, its matrices are multiplied from
-   both sides by powers of two and so are its unknowns.
+   brought back exactly. They are the same inequalities, with powers of two on rows, columns and unknowns (but for the
+   factors that I.3 chooses for its uncertainty).
 4. The margin program (`quasilpv.lmi.margin`), in the units fitted first, if a step came to no conclusion, or if the
    system came in units far from all that were fitted.
 5. *Infeasible, numerically* if the solver says so in all units, or the margin program does; else *unknown*.

@@ -25,6 +25,7 @@ from quasilpv.studies.examination import Case, Finding, examine, is_small, no_so
 from quasilpv.studies.law import Law
 from quasilpv.systems.catalogue import system_kind
 from quasilpv.systems.premise import AffineMatrix
+from quasilpv.systems.system_kind import SystemKind
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ class Question:
     """A condition for a system that has a name.
 
     Attributes:
-        system: its id, see `quasilpv.systems.catalogue.system_kind`; a relative path becomes an absolute one.
+        system: its id, see `quasilpv.systems.catalogue.system_kind`; a relative path becomes an absolute one. Or a kind
+            that has no name any other process could resolve (`quasilpv.systems.own_kind`).
         condition: its id.
         representation: its name, see `quasilpv.polytopes.polytopic_model`; empty for the one the condition was
             published with.
@@ -43,7 +45,7 @@ class Question:
         InputError: there is no such system, parameter or condition.
     """
 
-    system: str
+    system: str | SystemKind
     condition: str
     representation: str = ""
     parameters: tuple[tuple[str, float], ...] = ()
@@ -56,7 +58,8 @@ class Question:
         object.__setattr__(self, "parameters", tuple(sorted(dict(self.parameters).items())))
         condition(self.condition)
         kind = system_kind(self.system)
-        object.__setattr__(self, "system", kind.id)
+        if isinstance(self.system, str):
+            object.__setattr__(self, "system", kind.id)
         kind.system(**dict(self.parameters))
 
     def at(self, point: Mapping[str, float]) -> Question:
@@ -77,10 +80,10 @@ class Question:
 
     def to_document(self) -> dict[str, Any]:
         """JSON-able; a fingerprint tells two contents of one file of a user apart."""
-        fingerprint = system_kind(self.system).fingerprint
+        kind = system_kind(self.system)
         return {
-            "system": self.system,
-            **({"system_fingerprint": fingerprint} if fingerprint else {}),
+            "system": kind.id,
+            **({"system_fingerprint": kind.fingerprint} if kind.fingerprint else {}),
             "condition": self.condition,
             "representation": self.representation,
             "parameters": dict(self.parameters),

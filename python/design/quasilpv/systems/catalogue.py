@@ -36,7 +36,7 @@ _KINDS = (
 SYSTEMS: Mapping[str, SystemKind] = MappingProxyType({kind.id: kind for kind in _KINDS})
 
 
-def system_kind(reference: str) -> SystemKind:
+def system_kind(reference: str | SystemKind) -> SystemKind:
     """The system, or the family of systems, that a reference names.
 
     Every place that takes a system by name goes through here.
@@ -47,12 +47,16 @@ def system_kind(reference: str) -> SystemKind:
     | another name | an entry point of the group `ENTRY_POINT_GROUP` of an installed package |
     | ``FILE.py:NAME`` | a system, or a function of parameters with defaults, in a Python file, which is executed |
 
+    A kind stands for itself.
+
     Returns:
         A kind whose `id` any process of this machine can resolve again: paths are absolute.
 
     Raises:
         InputError: there is no such system (those there are are listed), or the user's code fails.
     """
+    if isinstance(reference, SystemKind):
+        return reference
     if reference in SYSTEMS:
         return SYSTEMS[reference]
     if is_python_reference(reference):

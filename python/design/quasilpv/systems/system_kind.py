@@ -28,9 +28,9 @@ class Parameter:
     affine: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SystemKind:
-    """A parametrised descriptor system.
+    """A parametrised descriptor system. Kinds are the same if id and fingerprint are.
 
     Attributes:
         id: the name it is known by.
@@ -55,6 +55,14 @@ class SystemKind:
         """Take the id for a file name if no other is given."""
         if not self.stem:
             object.__setattr__(self, "stem", self.id)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both stand for the same systems."""
+        return isinstance(other, SystemKind) and (self.id, self.fingerprint) == (other.id, other.fingerprint)
+
+    def __hash__(self) -> int:
+        """By id and fingerprint."""
+        return hash((self.id, self.fingerprint))
 
     def system(self, **parameters: float) -> DescriptorSystem:
         """The system at the given parameters, defaults for the others.

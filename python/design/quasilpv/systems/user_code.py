@@ -157,7 +157,7 @@ def _kind(value: Any, kind_id: str, stem: str, source: str, fingerprint: str) ->
             return value
 
     elif callable(value):
-        parameters, build, summary = _parameters(value, kind_id), value, _first_line(value)
+        parameters, build, summary = numeric_parameters(value, kind_id), value, _first_line(value)
     else:
         expected = "a DescriptorSystem, or a function of parameters with defaults that returns one"
         raise InputError(source, stem, f"the {type(value).__name__} {value!r:.40}", expected)
@@ -174,7 +174,7 @@ def _kind(value: Any, kind_id: str, stem: str, source: str, fingerprint: str) ->
     )
 
 
-def _parameters(function: Callable[..., Any], kind_id: str) -> dict[str, Parameter]:
+def numeric_parameters(function: Callable[..., Any], kind_id: str) -> dict[str, Parameter]:
     """The parameters of a function whose defaults are numbers.
 
     Raises:
@@ -203,7 +203,7 @@ def _guarded(
 
     @lru_cache(maxsize=_CACHED_SYSTEMS)
     def guarded(**values: float) -> DescriptorSystem:
-        typed = {name: _like(parameters[name].default, value) for name, value in values.items()}
+        typed = {name: like_default(parameters[name].default, value) for name, value in values.items()}
         with _reported(source), _beside(source):
             made = build(**typed)
         if not isinstance(made, DescriptorSystem):
@@ -214,7 +214,7 @@ def _guarded(
     return guarded
 
 
-def _like(default: float, value: float) -> float:
+def like_default(default: float, value: float) -> float:
     """A whole number stays one where the default is one: ``range(n)`` takes no float."""
     if isinstance(default, bool) and value in (0.0, 1.0):
         return bool(value)

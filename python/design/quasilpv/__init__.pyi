@@ -1,0 +1,13 @@
+from quasilpv.errors import InputError as InputError
+from quasilpv.studies.answer import Answer as Answer
+from quasilpv.studies.answer import Evidence as Evidence
+from quasilpv.studies.answer import Verdict as Verdict
+from quasilpv.studies.front_door import boundary as boundary
+from quasilpv.studies.front_door import region as region
+from quasilpv.studies.front_door import solve as solve
+from quasilpv.studies.law import Law as Law
+from quasilpv.systems.descriptor import DescriptorSystem as DescriptorSystem
+from quasilpv.systems.equations import rate as rate
+from quasilpv.systems.structure import structure_report as structure_report
+
+__version__: str
