@@ -300,6 +300,7 @@ def test_a_claim_leaves_no_folder_that_it_made_unless_something_came_into_it(tmp
         write_readable_json(tmp_path / "d" / "kept.json", {})
         claim_file(tmp_path / "e" / "file")
         assert (tmp_path / "a" / "b" / "c").is_dir()
+        claim_folder(tmp_path / "a" / ".." / "d")  # what is its own already
     assert names(tmp_path) == ["d"]
     assert names(tmp_path / "d") == ["kept.json"]
     (tmp_path / "file").touch()

@@ -20,7 +20,7 @@ from mcap.reader import make_reader
 from quasilpv.artifact import Artifact, read_artifact, write_artifact
 from quasilpv.cli import run
 from quasilpv.errors import InputError
-from quasilpv.experiments.hil import WIRE_LOG_NAME, run_over_lcm
+from quasilpv.experiments.hil import run_over_lcm
 from quasilpv.experiments.logged import logged_result, mechanism_of
 from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.track import TrackingExperiment, track
@@ -497,7 +497,7 @@ def test_when_two_processes_talk_expect_their_traffic_in_the_log_and_a_replay_bi
     monkeypatch.setenv("PATH", str(Path(executable("qlpv-simulator")).parent), prepend=":")
     executable("qlpv-controller")
     run_over_lcm(experiment, artifact, tmp_path, plant="perturbed", sensors=Sensors(), mode="lockstep")
-    heard, made = read_log(tmp_path / WIRE_LOG_NAME), read_log(tracked[1])
+    heard, made = read_log(tmp_path / LOG_NAME), read_log(tracked[1])
     for channel, own in COMPARED:
         theirs, ours = heard[channel].samples, made[channel].samples
         assert theirs.size >= 0.9 * SAMPLES  # a busy machine may lose some

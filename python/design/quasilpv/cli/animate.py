@@ -14,7 +14,6 @@ from quasilpv.cli.session import Session, draw_results
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.track import PlantKind, TrackingExperiment
 from quasilpv.figures.animation import write_animation
-from quasilpv.files import claim_folder
 from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
@@ -53,7 +52,6 @@ def animate_command(
     experiments = [TrackingExperiment.registered(name) for name in dict.fromkeys(scenarios or DEFAULT_SCENARIOS)]
     bits = ENCODER_BITS if encoder_bits is None else encoder_bits
     variants = [Variant(DEFAULT_CONTROLLER, bits, compensated) for compensated in (False, True)]
-    claim_folder(out)
     session = Session(None, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
     results: list[TrackResult] = []
     made: list[dict[str, Any]] = []

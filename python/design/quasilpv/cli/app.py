@@ -38,7 +38,13 @@ EXIT_CODES: tuple[tuple[type[QuasilpvError], int], ...] = (
     (TransportError, 5),
     (PlantError, 6),
 )
-EXIT_NOT_SHOWN, EXIT_MISTAKE, EXIT_INTERRUPTED, EXIT_READER_LEFT = 1, 70, 130, 141
+EXIT_MISTAKE, EXIT_INTERRUPTED, EXIT_READER_LEFT = 70, 130, 141
+OUTCOMES: dict[type[QuasilpvError], str] = {
+    InfeasibleError: "infeasible",
+    ClaimError: "claim fails",
+    FaultStop: "fault",
+}
+"""Errors that are answers, and how ``--json`` calls them where a verb has not answered itself."""
 TRACEBACK = "QUASILPV_TRACEBACK"
 """Variable of the environment: with it, a mistake of the program is told with its traceback."""
 
@@ -126,8 +132,9 @@ def _run(arguments: Sequence[str]) -> int:
         return _fail(str(usage_error(error)), 2)
     except QuasilpvError as error:
         code = next((code for kind, code in EXIT_CODES if isinstance(error, kind)), EXIT_MISTAKE)
-        if code == EXIT_NOT_SHOWN and "--json" in arguments and not answered():
-            print_json({"error": type(error).__name__.removesuffix("Error").lower(), "reason": str(error)})
+        outcome = next((word for kind, word in OUTCOMES.items() if isinstance(error, kind)), None)
+        if outcome is not None and "--json" in arguments and not answered():
+            print_json({"outcome": outcome, "reason": str(error)})
         return _fail(str(error), code)
     except (KeyboardInterrupt, typer.Abort):
         return _fail("interrupted", EXIT_INTERRUPTED)

@@ -12,6 +12,7 @@ from quasilpv.cli.options import designed, sensors_of
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
 from quasilpv.figures.gallery import write_comparison, write_gallery
+from quasilpv.files import claim_folder
 from quasilpv.telemetry import LOG_NAME
 from quasilpv.telemetry.log import point_to
 
@@ -33,6 +34,10 @@ class Session:
     plant: PlantKind
     out: Path
     log: bool = True
+
+    def __post_init__(self) -> None:
+        """Claim the folder for this command. InputError: another one is writing there."""
+        claim_folder(self.out)
 
     def controller(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> Artifact:
         """The controller of a run: the given one, or the variant's design."""

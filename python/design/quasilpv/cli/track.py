@@ -25,7 +25,7 @@ from quasilpv.cli.session import Session, draw_results
 from quasilpv.errors import InputError
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.track import PlantKind, TrackingExperiment, variant_of
-from quasilpv.files import claim_folder, write_readable_json
+from quasilpv.files import write_readable_json
 from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
@@ -92,7 +92,6 @@ def track_command(
     given = None if artifact is None else _given(artifact, controllers, rate_hz, no_compensation)
     variants = _variants(given, controllers, encoder_bits, no_compensation)
     session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
-    claim_folder(out)
     results = run_all(session, experiments, variants)
     if not json if figures is None else figures:
         draw_results(results, out)

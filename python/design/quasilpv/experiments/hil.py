@@ -17,7 +17,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from quasilpv.artifact import Artifact
-from quasilpv.errors import ClaimError, InputError, PlantError, QuasilpvError, TransportError
+from quasilpv.errors import ClaimError, FaultStop, InputError, PlantError, QuasilpvError, TransportError
+from quasilpv.experiments.fault import Fault, fault_of
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import FloatArray, Run
 from quasilpv.experiments.track import (
@@ -31,17 +32,19 @@ from quasilpv.experiments.track import (
     write_run_files,
 )
 from quasilpv.scenarios import Sensors
-from quasilpv.telemetry import SUFFIX
+from quasilpv.telemetry import LOG_NAME
+from quasilpv.telemetry.log import point_to
 from quasilpv.telemetry.recorder import Recorder
 
 Mode: TypeAlias = Literal["lockstep", "realtime"]
 
 CONTROLLER, SIMULATOR = "qlpv-controller", "qlpv-simulator"
-WIRE_LOG_NAME = f"wire{SUFFIX}"
 MULTICAST_GROUP = "239.255.76.67"
 POLL_S = 0.02
 SILENCE_S = 10.0
 """A process gives up after so long without the other one."""
+LEAST_SAMPLES = 2
+"""Of a run that has increments of torque to count."""
 LOCK_STEP_LIMIT_S = 600.0
 """Nothing in lock-step bounds the run but the processes; this does."""
 
@@ -77,17 +80,22 @@ class HilResult:
 
     Attributes:
         mode: ``"lockstep"`` or ``"realtime"``.
-        result: the numbers of the run.
+        result: the numbers of the run; of one that a fault stopped, those of the samples before it.
         controller: what `qlpv-controller` reports: steps, counters, latencies in ns.
         simulator: what `qlpv-simulator` reports, likewise.
-        fault: why a fault stopped the run, in the words of the program that says so; None if it was none.
+        stop: the fault that stopped the run; None if it was none.
     """
 
     mode: Mode
     result: TrackResult
     controller: dict[str, Any]
     simulator: dict[str, Any]
-    fault: str | None = None
+    stop: Fault | None = None
+
+    @property
+    def fault(self) -> str | None:
+        """What stopped the run and when, in a line."""
+        return None if self.stop is None else str(self.stop)
 
 
 def run_over_lcm(
@@ -123,6 +131,7 @@ def run_over_lcm(
         InputError: robot and controller do not fit, an executable is missing, or the folder cannot be written.
         TransportError: the processes did not hear each other.
         PlantError: the plant could not be integrated.
+        FaultStop: a fault stopped the run before there was anything to count.
     """
     files = write_run_files(folder, experiment, artifact, plant=plant, sensors=sensors)
     records = {CONTROLLER: folder / "controller.csv", SIMULATOR: folder / "plant.csv"}
@@ -134,18 +143,31 @@ def run_over_lcm(
         commands = {name: [*command, *(real_time or RealTimeOptions()).of(name)] for name, command in commands.items()}
     limit_s = LOCK_STEP_LIMIT_S if mode == "lockstep" else experiment.trajectory.duration_s + 4 * SILENCE_S
     documents = run_documents(mode, files, experiment, artifact, variant or variant_of(artifact, sensors))
-    with Recorder(url, folder / WIRE_LOG_NAME, documents) if log else nullcontext() as recorder:
-        reports, fault = _run_both(commands, limit_s)
+    with Recorder(url, folder / LOG_NAME, documents) if log else nullcontext() as recorder:
+        reports, said = _run_both(commands, limit_s)
         if recorder is not None:
             recorder.add_truth(read_record(records[SIMULATOR], artifact.joints))
+    if log:
+        point_to(folder / LOG_NAME)
     run = merge_records(records[SIMULATOR], records[CONTROLLER], artifact)
+    stop = None if said is None else _stop(said, reports[CONTROLLER], records, artifact)
+    if stop is not None:
+        run = run.until(stop.sample)
+        if run.time_s.size < LEAST_SAMPLES:
+            raise FaultStop(str(stop))
     return HilResult(
         mode,
         summarise(run, experiment, artifact, plant=plant, sensors=sensors, variant=variant),
         reports[CONTROLLER],
         reports[SIMULATOR],
-        fault,
+        stop,
     )
+
+
+def _stop(said: str, report: dict[str, Any], records: dict[str, Path], artifact: Artifact) -> Fault:
+    """The fault of a run, from the records of both programs and the report of the controller."""
+    controller, plant = (read_record(records[name], artifact.joints) for name in (CONTROLLER, SIMULATOR))
+    return fault_of(said, report, controller, plant, artifact.sample_period_s)
 
 
 def require_identical(over_lcm: Run, in_process: Run) -> None:

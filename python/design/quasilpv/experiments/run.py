@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -52,6 +52,12 @@ class Run:
     def joints(self) -> int:
         """Number of joints n."""
         return int(self.true_angle_rad.shape[1])
+
+    def until(self, sample: int) -> Run:
+        """The record before a sample, given by its number k."""
+        before = np.rint(self.time_s / self.sample_period_s) < sample
+        names = (field.name for field in fields(self) if field.name != "sample_period_s")
+        return replace(self, **{name: getattr(self, name)[before] for name in names})
 
     def first_difference(self, other: Run) -> str | None:
         """Name the first sample and quantity in which two runs differ in any bit.

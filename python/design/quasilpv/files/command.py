@@ -35,13 +35,23 @@ class _Command:
     Attributes:
         line: as it was typed, for whoever finds a folder claimed.
         inputs: files it has read, with the name it knew them by.
-        claims: to give back at its end.
+        made: files it has written itself.
+        claimed: places that are its own until its end.
+        claims: to give back then.
     """
 
     line: str
     inputs: dict[Identity, str] = field(default_factory=dict)
     made: set[Identity] = field(default_factory=set)
+    claimed: set[str] = field(default_factory=set)
     claims: ExitStack = field(default_factory=ExitStack)
+
+    def claim(self, folder: Path, name: str, meant: Path) -> None:
+        """Hold the lock ``name`` in a folder, unless it is held already."""
+        place = os.path.realpath(folder / name)
+        if place not in self.claimed:
+            self.claims.enter_context(_claimed(folder, name, meant))
+            self.claimed.add(place)
 
 
 _running: list[_Command] = []
@@ -100,7 +110,7 @@ def claim_folder(folder: Path) -> None:
         InputError: another command is writing there, which is named; or the folder cannot be written.
     """
     if _running:
-        _running[-1].claims.enter_context(_claimed(folder, LOCK_NAME, folder))
+        _running[-1].claim(folder, LOCK_NAME, folder)
 
 
 def claim_file(path: Path) -> None:
@@ -108,7 +118,7 @@ def claim_file(path: Path) -> None:
     place = Path(os.path.realpath(path))
     name = f"{LOCK_NAME}-{hashlib.sha256(os.fsencode(place.name)).hexdigest()[:16]}"
     if _running:
-        _running[-1].claims.enter_context(_claimed(place.parent, name, path))
+        _running[-1].claim(place.parent, name, path)
 
 
 @contextmanager
