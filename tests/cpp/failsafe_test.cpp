@@ -49,6 +49,18 @@ TEST(Failsafe, when_the_first_sample_is_healthy_expect_running) {
   EXPECT_EQ(Clockwork().sample({}).state, ControllerState::kRunning);
 }
 
+TEST(Failsafe, F22_when_the_robots_side_gives_a_reason_expect_a_fault_with_it_that_a_reset_leaves_once_it_is_gone) {
+  for (const FaultCause cause : {FaultCause::kSecondPlant, FaultCause::kSecondController, FaultCause::kPlantFailed}) {
+    FailsafeFlags told;
+    told.demanded = cause;
+    const FailsafeState fault = Clockwork().sample(told);
+    EXPECT_EQ(fault.state, ControllerState::kFault);
+    EXPECT_EQ(fault.cause, cause);
+    EXPECT_EQ(after_reset({}, fault, told).state, ControllerState::kFault);
+    EXPECT_EQ(after_reset({}, fault, {}).state, ControllerState::kReady);
+  }
+}
+
 TEST(Failsafe, F3_when_1_to_19_measurements_are_missing_expect_degraded_then_running_again) {
   Clockwork policy;
   for (int count = 1; count < 20; ++count) {

@@ -21,8 +21,8 @@ using testing::HasSubstr;
 constexpr WireIdentity kIdentity{42, -7, 3};
 constexpr std::int64_t kSecond = kNanosecondsPerSecond;
 
-measurement_v1 measurement(std::int64_t seq, double angle = 0.0) {
-  measurement_v1 message{};
+measurement_v2 measurement(std::int64_t seq, double angle = 0.0) {
+  measurement_v2 message{};
   message.seq = seq;
   message.angle_rad[0] = angle;
   return message;
@@ -39,12 +39,12 @@ class TwoEnds : public testing::Test {
 TEST_F(TwoEnds, carry_a_measurement_one_way_and_its_command_the_other) {
   plant_.send(measurement(4, 0.5));
   ASSERT_TRUE(controller_.receive(kSecond));
-  measurement_v1 received{};
+  measurement_v2 received{};
   ASSERT_TRUE(controller_.take(received));
   EXPECT_EQ(received.seq, 4);
   EXPECT_EQ(received.angle_rad[0], 0.5);
 
-  command_v1 command{};
+  command_v2 command{};
   command.seq = 4;
   controller_.send(command);
   ASSERT_TRUE(plant_.receive(kSecond));
@@ -57,7 +57,7 @@ TEST_F(TwoEnds, when_nothing_arrives_expect_a_wait_that_ends) {
   const std::int64_t start_ns = monotonic_ns();
   EXPECT_FALSE(controller_.receive(20 * kNanosecondsPerMillisecond));
   EXPECT_GE(monotonic_ns() - start_ns, 20 * kNanosecondsPerMillisecond);
-  measurement_v1 message{};
+  measurement_v2 message{};
   EXPECT_FALSE(controller_.take(message));
 }
 
@@ -66,7 +66,7 @@ TEST_F(TwoEnds, when_several_measurements_are_pending_expect_only_the_newest) {
     plant_.send(measurement(seq));
   }
   ASSERT_TRUE(controller_.receive(kSecond));
-  measurement_v1 received{};
+  measurement_v2 received{};
   ASSERT_TRUE(controller_.take(received));
   EXPECT_EQ(received.seq, 3);
   EXPECT_FALSE(controller_.take(received));
@@ -79,14 +79,14 @@ TEST_F(TwoEnds, F4_when_packets_are_reordered_expect_the_old_ones_ignored_and_co
     plant_.send(measurement(seq));
   }
   controller_.receive(kSecond);
-  measurement_v1 received{};
+  measurement_v2 received{};
   ASSERT_TRUE(controller_.take(received));
   EXPECT_EQ(received.seq, 7);
   EXPECT_EQ(controller_.counters().old, 2);
 }
 
 TEST_F(TwoEnds, F4_when_a_measurement_is_repeated_expect_it_counted_and_offered_again) {
-  measurement_v1 received{};
+  measurement_v2 received{};
   for (int i = 0; i < 3; ++i) {
     plant_.send(measurement(9));
     controller_.receive(kSecond);
@@ -100,13 +100,16 @@ TEST_F(TwoEnds, F4_when_a_duplicate_differs_expect_the_first_one_kept) {
   plant_.send(measurement(9, 1.0));
   plant_.send(measurement(9, 2.0));
   controller_.receive(kSecond);
-  measurement_v1 received{};
+  measurement_v2 received{};
   ASSERT_TRUE(controller_.take(received));
   EXPECT_EQ(received.angle_rad[0], 1.0);
+  EXPECT_EQ(controller_.counters().duplicates, 0);
+  EXPECT_EQ(controller_.counters().second_sender, 1);
+  EXPECT_EQ(controller_.peers().take_conflict(), Conflict::kSecondPlant);
 }
 
 TEST_F(TwoEnds, F5_when_foreign_messages_arrive_expect_a_run_of_them_counted_until_a_good_one) {
-  measurement_v1 foreign = measurement(1);
+  measurement_v2 foreign = measurement(1);
   foreign.joints = kIdentity.joints;
   Packet packet;
   foreign.session = kIdentity.session + 1;
@@ -129,7 +132,7 @@ TEST_F(TwoEnds, F5_when_foreign_messages_arrive_expect_a_run_of_them_counted_unt
 }
 
 Packet foreign_measurement() {
-  measurement_v1 foreign = measurement(1);
+  measurement_v2 foreign = measurement(1);
   foreign.joints = kIdentity.joints;
   foreign.session = kIdentity.session + 1;
   foreign.artifact_hash = kIdentity.artifact_hash;
@@ -150,7 +153,7 @@ TEST_F(TwoEnds, F5_when_a_good_message_ends_a_foreign_run_in_the_same_drain_expe
 }
 
 TEST_F(TwoEnds, F6_when_a_message_is_truncated_anywhere_or_of_another_type_expect_it_counted_and_not_accepted) {
-  measurement_v1 whole = measurement(1);
+  measurement_v2 whole = measurement(1);
   whole.joints = kIdentity.joints;
   whole.session = kIdentity.session;
   whole.artifact_hash = kIdentity.artifact_hash;
@@ -161,19 +164,20 @@ TEST_F(TwoEnds, F6_when_a_message_is_truncated_anywhere_or_of_another_type_expec
     controller_.receive(0);
   }
   EXPECT_EQ(controller_.counters().wrong_length, packet.size);
-  command_v1 command{};
+  command_v2 command{};
   encode(command, packet);
   controller_.inject(Channel::kMeasurement, packet.bytes.data(), static_cast<std::size_t>(packet.size));
   controller_.receive(0);
-  EXPECT_EQ(controller_.counters().wrong_length, measurement_v1{}.getEncodedSize() + 1);
+  EXPECT_EQ(controller_.counters().wrong_length, measurement_v2{}.getEncodedSize() + 1);
   EXPECT_EQ(controller_.counters().accepted, 0);
 }
 
 TEST_F(TwoEnds, when_several_events_arrive_at_once_expect_all_of_them_in_order) {
+  plant_.send(measurement(8));
   plant_.send(EventCode::kStarted, 0);
   plant_.send(EventCode::kEnded, 9);
   controller_.receive(kSecond);
-  event_v1 event{};
+  event_v2 event{};
   ASSERT_TRUE(controller_.take(event));
   EXPECT_EQ(event.code, static_cast<std::int32_t>(EventCode::kStarted));
   ASSERT_TRUE(controller_.take(event));
@@ -199,7 +203,7 @@ TEST_F(TwoEnds, F6_when_random_bytes_arrive_expect_each_counted_and_none_accepte
   for (int i = 0; i < kPackets; ++i) {
     const std::uint8_t* bytes = noise.data() + random() % (noise.size() - kMaxMessageBytes);
     // Every other packet has the right length, so that the checks behind the length see random bytes too.
-    const auto right = static_cast<std::size_t>(measurement_v1{}.getEncodedSize());
+    const auto right = static_cast<std::size_t>(measurement_v2{}.getEncodedSize());
     const std::size_t size = i % 2 == 0 ? right : random() % kMaxMessageBytes;
     controller_.inject(Channel::kMeasurement, bytes, size);
     controller_.receive(0);
@@ -221,9 +225,10 @@ TEST_F(TwoEnds, when_the_queue_is_full_expect_the_newest_dropped_and_counted) {
 }
 
 TEST_F(TwoEnds, tell_each_other_of_events_with_their_detail) {
+  controller_.send(command_v2{});
   controller_.send(EventCode::kFault, 17, 2);
   ASSERT_TRUE(plant_.receive(kSecond));
-  event_v1 event{};
+  event_v2 event{};
   ASSERT_TRUE(plant_.take(event));
   EXPECT_EQ(event.code, static_cast<std::int32_t>(EventCode::kFault));
   EXPECT_EQ(event.source, static_cast<std::int32_t>(Side::kController));
@@ -241,8 +246,8 @@ TEST(LcmLink, carries_messages_between_two_ends_and_ignores_its_own_events) {
   LcmLink plant(Side::kPlant, kIdentity, own_url(), false);
   plant.send(EventCode::kStarted, 0);
   plant.send(measurement(3, 0.25));
-  measurement_v1 received{};
-  event_v1 event{};
+  measurement_v2 received{};
+  event_v2 event{};
   bool measured = false;
   bool told = false;
   for (int tries = 0; tries < 100 && !(measured && told); ++tries) {

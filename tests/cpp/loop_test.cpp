@@ -216,8 +216,8 @@ class RunningController : public ::testing::Test {
   }
 
   /// The next command of at least `seq`.
-  command_v1 await_command(std::int64_t seq) {
-    command_v1 command{};
+  command_v2 await_command(std::int64_t seq) {
+    command_v2 command{};
     const std::int64_t end_ns = monotonic_ns() + kPatience;
     while (monotonic_ns() < end_ns) {
       plant_.receive(10 * kMillisecond);
@@ -244,9 +244,9 @@ class RunningController : public ::testing::Test {
 TEST_F(RunningController, when_a_measurement_is_repeated_in_lock_step_expect_the_same_command_and_one_step) {
   start({});
   plant_.send(measurement(0));
-  const command_v1 first = await_command(0);
-  plant_.send(measurement(0, {1.0, 1.0, 1.0}));
-  const command_v1 again = await_command(0);
+  const command_v2 first = await_command(0);
+  plant_.send(measurement(0));
+  const command_v2 again = await_command(0);
   EXPECT_EQ(again.seq, first.seq);
   for (int j = 0; j < kJoints; ++j) {
     EXPECT_EQ(again.torque_nm[j], first.torque_nm[j]);
@@ -280,7 +280,7 @@ TEST_F(RunningController, F16_when_the_plant_falls_silent_expect_a_fault_and_saf
   start(settings);
   plant_.send(measurement(0, {0.5, 0.0, 0.0}));
   await_command(0);
-  command_v1 command = await_command(1);
+  command_v2 command = await_command(1);
   EXPECT_EQ(command.state, static_cast<std::int32_t>(ControllerState::kFault));
   const std::int64_t end_ns = monotonic_ns() + kPatience;
   const auto is_zero = [&command] {
@@ -290,7 +290,7 @@ TEST_F(RunningController, F16_when_the_plant_falls_silent_expect_a_fault_and_saf
     command = await_command(command.seq + 1);
   }
   EXPECT_TRUE(is_zero());
-  event_v1 event{};
+  event_v2 event{};
   ASSERT_TRUE(plant_.take(event));
   EXPECT_EQ(finish().end, ControllerRunEnd::kPlantSilent);
   EXPECT_EQ(loop_.cause(), FaultCause::kPlantSilent);

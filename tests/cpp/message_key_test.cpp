@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "quasilpv/errors.hpp"
+#include "quasilpv/failsafe.hpp"
 #include "quasilpv/in_process_link.hpp"
 
 namespace quasilpv {
@@ -28,8 +29,8 @@ MessageKey key_of(std::uint8_t first) {
   return MessageKey(secret);
 }
 
-command_v1 command(std::int64_t seq) {
-  command_v1 message{};
+command_v2 command(std::int64_t seq) {
+  command_v2 message{};
   message.seq = seq;
   message.session = kIdentity.session;
   message.artifact_hash = kIdentity.artifact_hash;
@@ -37,7 +38,7 @@ command_v1 command(std::int64_t seq) {
   return message;
 }
 
-Packet signed_packet(const command_v1& message, const MessageKey& key) {
+Packet signed_packet(const command_v2& message, const MessageKey& key) {
   Packet packet;
   encode(message, packet);
   const auto size = static_cast<std::size_t>(packet.size);
@@ -65,17 +66,17 @@ class AuthenticatedEnds : public ::testing::Test {
 };
 
 TEST_F(AuthenticatedEnds, with_one_key_understand_each_other) {
-  measurement_v1 measurement{};
+  measurement_v2 measurement{};
   measurement.seq = 3;
   plant_.send(measurement);
   plant_.send(EventCode::kStarted, 0);
   plant_.send(EventCode::kEnded, 9);
   controller_.receive(0);
   EXPECT_TRUE(controller_.take(measurement));
-  event_v1 event;
+  event_v2 event;
   EXPECT_TRUE(controller_.take(event));
   EXPECT_TRUE(controller_.take(event));
-  command_v1 answer = command(3);
+  command_v2 answer = command(3);
   controller_.send(answer);
   plant_.receive(0);
   EXPECT_TRUE(plant_.take(answer));
@@ -91,14 +92,14 @@ TEST_F(AuthenticatedEnds, when_100000_commands_are_forged_or_replayed_expect_non
     recorded.push_back(signed_packet(command(seq), key_of(1)));
     inject(plant_, Channel::kCommand, recorded.back());
   }
-  command_v1 taken;
+  command_v2 taken;
   ASSERT_TRUE(plant_.take(taken));
   ASSERT_EQ(plant_.counters().accepted, kNewest + 1);
 
   std::int64_t forged = 0;
   std::int64_t replayed = 0;
   for (int attack = 0; attack < kAttacks; ++attack) {
-    command_v1 next = command(kNewest + 1 + attack);
+    command_v2 next = command(kNewest + 1 + attack);
     next.torque_nm[0] = 1e3;
     Packet packet = recorded[random() % recorded.size()];
     switch (attack % 5) {
@@ -135,12 +136,17 @@ TEST_F(AuthenticatedEnds, when_100000_commands_are_forged_or_replayed_expect_non
 }
 
 TEST_F(AuthenticatedEnds, when_a_reset_is_replayed_expect_it_refused_and_a_new_one_accepted) {
-  event_v1 reset{};
+  event_v2 reset{};
   reset.utime = 17;
   reset.session = kIdentity.session;
   reset.artifact_hash = kIdentity.artifact_hash;
   reset.source = static_cast<std::int32_t>(Side::kOperator);
   reset.code = static_cast<std::int32_t>(EventCode::kReset);
+  reset.receiver = controller_.sender();
+  reset.seq = 3;
+  command_v2 in_fault = command(3);
+  in_fault.state = static_cast<std::int32_t>(ControllerState::kFault);
+  controller_.send(in_fault);
   const auto send = [&] {
     Packet packet;
     encode(reset, packet);
@@ -148,7 +154,7 @@ TEST_F(AuthenticatedEnds, when_a_reset_is_replayed_expect_it_refused_and_a_new_o
     key_of(1).sign(packet.bytes.data(), size, packet.bytes.data() + size);
     packet.size += static_cast<int>(kTag);
     inject(controller_, Channel::kEvent, packet);
-    event_v1 event;
+    event_v2 event;
     return controller_.take(event);
   };
   EXPECT_TRUE(send());
@@ -161,7 +167,7 @@ TEST_F(AuthenticatedEnds, when_a_reset_is_replayed_expect_it_refused_and_a_new_o
 TEST_F(AuthenticatedEnds, when_only_one_side_has_the_key_expect_neither_to_accept_the_other) {
   const auto [controller, plant] = InProcessLink::create_pair(kIdentity);
   controller->authenticate_with(key_of(1));
-  plant->send(measurement_v1{});
+  plant->send(measurement_v2{});
   controller->send(command(0));
   controller->receive(0);
   plant->receive(0);

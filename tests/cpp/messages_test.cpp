@@ -1,6 +1,7 @@
 #include "quasilpv/messages.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <limits>
@@ -19,8 +20,11 @@ Message sealed_message() {
   message.seq = 5;
   message.session = kIdentity.session;
   message.artifact_hash = kIdentity.artifact_hash;
-  if constexpr (!std::is_same_v<Message, event_v1>) {
+  if constexpr (!std::is_same_v<Message, event_v2>) {
     message.joints = kIdentity.joints;
+  } else {
+    message.source = static_cast<std::int32_t>(Side::kPlant);
+    message.code = static_cast<std::int32_t>(EventCode::kStarted);
   }
   return message;
 }
@@ -42,7 +46,7 @@ void reseal(Packet& packet) {
 
 template <class Message>
 class EveryMessage : public testing::Test {};
-using Messages = testing::Types<measurement_v1, command_v1, telemetry_v1, event_v1>;
+using Messages = testing::Types<measurement_v2, command_v2, telemetry_v1, event_v2>;
 TYPED_TEST_SUITE(EveryMessage, Messages);
 
 TYPED_TEST(EveryMessage, fits_one_unfragmented_packet) {
@@ -99,19 +103,19 @@ TYPED_TEST(EveryMessage, when_session_or_artifact_differ_expect_it_refused) {
 
 TEST(Messages, when_the_number_of_joints_differs_expect_the_artifact_refused) {
   Packet packet;
-  encode(sealed_message<measurement_v1>(), packet);
-  EXPECT_EQ(decode_status<measurement_v1>(packet, {42, -7, 2}), DecodeStatus::kWrongArtifact);
+  encode(sealed_message<measurement_v2>(), packet);
+  EXPECT_EQ(decode_status<measurement_v2>(packet, {42, -7, 2}), DecodeStatus::kWrongArtifact);
 }
 
 TEST(Messages, keep_every_bit_of_a_double) {
-  command_v1 sent = sealed_message<command_v1>();
+  command_v2 sent = sealed_message<command_v2>();
   const double values[] = {
       0.1,    -0.0,  std::numeric_limits<double>::denorm_min(), std::numeric_limits<double>::infinity(), 1.0 / 3.0,
       -1e308, 5e-324};
   std::copy(std::begin(values), std::end(values), sent.torque_nm);
   Packet packet;
   encode(sent, packet);
-  command_v1 received{};
+  command_v2 received{};
   ASSERT_EQ(decode(packet.bytes.data(), static_cast<std::size_t>(packet.size), kIdentity, received),
             DecodeStatus::kAccepted);
   for (int j = 0; j < kMaxJoints; ++j) {
@@ -122,11 +126,74 @@ TEST(Messages, keep_every_bit_of_a_double) {
 
 TEST(Messages, when_refused_expect_the_target_untouched) {
   Packet packet;
-  encode(sealed_message<command_v1>(), packet);
-  command_v1 target{};
+  encode(sealed_message<command_v2>(), packet);
+  command_v2 target{};
   target.seq = 99;
-  decode(packet.bytes.data(), static_cast<std::size_t>(packet.size), {0, 0, 3}, target);
+  packet.bytes[20] ^= 1u;
+  decode(packet.bytes.data(), static_cast<std::size_t>(packet.size), kIdentity, target);
   EXPECT_EQ(target.seq, 99);
+}
+
+TEST(Messages, when_of_another_session_expect_it_to_say_of_which) {
+  Packet packet;
+  encode(sealed_message<command_v2>(), packet);
+  command_v2 target{};
+  EXPECT_EQ(decode(packet.bytes.data(), static_cast<std::size_t>(packet.size), {0, 0, 3}, target),
+            DecodeStatus::kWrongSession);
+  EXPECT_EQ(target.session, kIdentity.session);
+}
+
+/// A message in which one number was set to something that no side sends.
+template <class Message, class Value>
+DecodeStatus status_with(Value Message::*member, Value value, std::int64_t period_ns = 1'000'000) {
+  Message message = sealed_message<Message>();
+  message.*member = value;
+  Packet packet;
+  encode(message, packet);
+  return decode_status<Message>(
+      packet, {kIdentity.session, kIdentity.artifact_hash, kIdentity.joints, Pace::kLockStep, period_ns});
+}
+
+constexpr std::int64_t kLowest = std::numeric_limits<std::int64_t>::min();
+constexpr std::int64_t kHighest = std::numeric_limits<std::int64_t>::max();
+
+TYPED_TEST(EveryMessage, when_a_number_of_it_is_beyond_what_any_side_sends_expect_it_refused) {
+  for (const std::int64_t value : {kLowest, std::int64_t{-1}, kHighest}) {
+    EXPECT_EQ(status_with(&TypeParam::utime, value), DecodeStatus::kOutOfBounds) << value;
+    EXPECT_EQ(status_with(&TypeParam::seq, value), DecodeStatus::kOutOfBounds) << value;
+    if constexpr (!std::is_same_v<TypeParam, telemetry_v1>) {
+      EXPECT_EQ(status_with(&TypeParam::period_ns, value), DecodeStatus::kOutOfBounds) << value;
+    }
+  }
+  if constexpr (!std::is_same_v<TypeParam, telemetry_v1>) {
+    EXPECT_EQ(status_with(&TypeParam::mode, 2), DecodeStatus::kOutOfBounds);
+    EXPECT_EQ(status_with(&TypeParam::mode, -1), DecodeStatus::kOutOfBounds);
+    EXPECT_EQ(status_with(&TypeParam::mode, 1), DecodeStatus::kAccepted);
+  }
+}
+
+TYPED_TEST(EveryMessage, when_its_sample_is_the_last_one_possible_expect_its_time_in_64_bits) {
+  for (const std::int64_t period_ns : {std::int64_t{1}, std::int64_t{1'000'000}, std::int64_t{10'000'000'000}}) {
+    const std::int64_t last = kLongestTimeNs / period_ns;
+    EXPECT_EQ(status_with(&TypeParam::seq, last, period_ns), DecodeStatus::kAccepted);
+    EXPECT_EQ(status_with(&TypeParam::seq, last + 1, period_ns), DecodeStatus::kOutOfBounds);
+    EXPECT_LE(last + 1, kHighest / period_ns);
+  }
+}
+
+TEST(Messages, when_a_code_has_no_meaning_expect_it_refused) {
+  for (const std::int32_t code : {-1, 0, 5, 1 << 30}) {
+    EXPECT_EQ(status_with(&event_v2::code, code), DecodeStatus::kOutOfBounds) << code;
+    EXPECT_EQ(status_with(&event_v2::source, code == 5 ? 4 : code), DecodeStatus::kOutOfBounds) << code;
+    EXPECT_EQ(status_with(&command_v2::state, code == 0 ? 6 : code), DecodeStatus::kOutOfBounds) << code;
+  }
+}
+
+TEST(Messages, a_sender_has_a_name_of_its_own_that_holds_the_process) {
+  const std::int64_t first = new_sender();
+  EXPECT_GT(first, 0);
+  EXPECT_NE(first, new_sender());
+  EXPECT_EQ(process_of(first), static_cast<std::int64_t>(getpid()) & 0x3FFFFF);
 }
 
 }  // namespace

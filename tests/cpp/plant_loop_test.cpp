@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <memory>
 #include <string>
 #include <thread>
@@ -90,7 +91,7 @@ TEST(PlantLoop, when_the_first_copy_of_every_measurement_is_lost_expect_the_same
   auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
   std::thread thread([&, link = controller_end.get()] {
     ControlLoop loop(law, trajectory(), {});
-    measurement_v1 received{};
+    measurement_v2 received{};
     std::int64_t lost = -1;
     for (std::int64_t answered = 0; answered < kSamples && link->receive(kPatience);) {
       if (!link->take(received)) {
@@ -131,11 +132,11 @@ TEST(PlantLoop, F7_when_commands_stop_in_real_time_expect_the_torque_held_for_20
   const Scenario experiment = scenario(kSamples);
   auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
   std::thread thread([link = controller_end.get()] {
-    measurement_v1 received{};
+    measurement_v2 received{};
     for (std::int64_t newest = 0; newest < kAnswered && link->receive(kPatience);) {
       if (link->take(received)) {
         newest = received.seq;
-        command_v1 command{};
+        command_v2 command{};
         command.seq = received.seq;
         command.torque_nm[0] = 5.0;
         link->send(command);
@@ -171,6 +172,118 @@ TEST(PlantLoop, F7_when_commands_stop_in_real_time_expect_the_torque_held_for_20
   }
   EXPECT_EQ(report.watchdog_samples, braked);
   EXPECT_GT(braked, 0);
+}
+
+/// A controller that answers `bad_from` and all later measurements with the torque `bad`, those before with 5 N m.
+void answer_with(Link& link, std::int64_t bad_from, double bad, const std::atomic<bool>& over) {
+  measurement_v2 received{};
+  while (!over) {
+    link.receive(kMillisecond);
+    if (link.take(received)) {
+      command_v2 command{};
+      command.seq = received.seq;
+      command.torque_nm[1] = received.seq < bad_from ? 5.0 : bad;
+      link.send(command);
+    }
+  }
+}
+
+class BadTorque : public ::testing::TestWithParam<double> {};
+
+TEST_P(BadTorque, F25_in_lock_step_is_refused_and_counted_and_never_integrated) {
+  constexpr std::int64_t kGood = 5;
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
+  std::atomic<bool> over{false};
+  std::thread thread([&, link = controller_end.get()] { answer_with(*link, kGood, GetParam(), over); });
+  PlantSession session(scenario(50), kSamplePeriod);
+  PlantRunSettings settings;
+  settings.timeout_s = 0.15;
+  settings.torque_limit_nm = artifact().limits().torque_nm;
+  Record record;
+  const std::atomic<bool> stop{false};
+  const PlantRunReport report = run_plant(session, *plant_end, settings, &record, stop);
+  over = true;
+  thread.join();
+
+  EXPECT_EQ(report.end, PlantRunEnd::kCommandsRefused);
+  EXPECT_EQ(report.samples, kGood);
+  EXPECT_GT(report.refused_commands, 0);
+  EXPECT_NE(report.refusal.find("torque_nm[1] of sample 5 is "), std::string::npos) << report.refusal;
+  EXPECT_EQ(record["seq"].values.size(), static_cast<std::size_t>(kGood));
+}
+
+TEST_P(BadTorque, F25_in_real_time_is_held_off_then_braked_by_the_watchdog) {
+  constexpr std::int64_t kGood = 5;
+  constexpr std::int64_t kSamples = 60;
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
+  std::atomic<bool> over{false};
+  std::thread thread([&, link = controller_end.get()] { answer_with(*link, kGood, GetParam(), over); });
+  const Scenario experiment = scenario(kSamples);
+  PlantSession session(experiment, kSamplePeriod);
+  PlantRunSettings settings;
+  settings.pace = Pace::kRealTime;
+  settings.brake_nm_s = viscous_brake(experiment, 0.05);
+  settings.torque_limit_nm = artifact().limits().torque_nm;
+  Record record;
+  const std::atomic<bool> stop{false};
+  const PlantRunReport report = run_plant(session, *plant_end, settings, &record, stop);
+  over = true;
+  thread.join();
+
+  EXPECT_EQ(report.samples, kSamples);
+  EXPECT_GT(report.refused_commands, 0);
+  EXPECT_TRUE(report.watchdog_at_end);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(kSamples); ++k) {
+    const double torque = record["torque_nm"].values[k * kJoints + 1];
+    const double speed = record["speed_rad_s"].values[k * kJoints + 1];
+    ASSERT_TRUE(torque == 5.0 || torque == -settings.brake_nm_s[1] * speed || (k == 0 && torque == 0.0)) << k;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(PlantLoop, BadTorque,
+                         ::testing::Values(std::numeric_limits<double>::quiet_NaN(),
+                                           -std::numeric_limits<double>::infinity(), 1e300, -1e300,
+                                           artifact().limits().torque_nm[1] * (1.0 + 1e-15)));
+
+TEST(PlantLoop, F22_when_a_second_controller_answers_in_lock_step_expect_the_run_ended_and_both_told) {
+  auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
+  std::atomic<bool> over{false};
+  FaultCause told = FaultCause::kNone;
+  std::thread thread([&, link = controller_end.get()] {
+    LinkRobot robot(*link);
+    RobotReading reading;
+    while (!over) {
+      if (robot.read(reading, kMillisecond)) {
+        robot.write({reading.seq, {}, ControllerState::kRunning, kStepHealthy});
+      }
+      if (robot.take_request() == RobotRequest::kEnd) {
+        told = robot.take_fault();
+      }
+    }
+  });
+  command_v2 other{};
+  const WireIdentity identity = plant_end->identity();
+  other.session = identity.session;
+  other.artifact_hash = identity.artifact_hash;
+  other.joints = identity.joints;
+  other.sender = 99;
+  Packet packet;
+  PlantSession session(scenario(100'000), kSamplePeriod);
+  const std::atomic<bool> stop{false};
+  std::thread second([&, link = plant_end.get()] {
+    for (; !over; sleep_until(monotonic_ns() + kMillisecond)) {
+      encode(other, packet);
+      link->inject(Channel::kCommand, packet.bytes.data(), static_cast<std::size_t>(packet.size));
+    }
+  });
+  const PlantRunReport report = run_plant(session, *plant_end, {}, nullptr, stop);
+  sleep_until(monotonic_ns() + 20 * kMillisecond);
+  over = true;
+  thread.join();
+  second.join();
+  EXPECT_EQ(report.end, PlantRunEnd::kSecondController);
+  EXPECT_LT(report.samples, 100'000);
+  EXPECT_EQ(told, FaultCause::kSecondController);
 }
 
 TEST(PlantLoop, brakes_each_joint_with_the_time_constant_asked_for) {

@@ -60,10 +60,12 @@ TEST(PlantRobot, F17_when_the_plant_cannot_be_integrated_expect_the_run_ended_wi
 
 class OverALink : public ::testing::Test {
  protected:
-  /// An event of `session`, from a person.
-  void ask_for_reset(std::int64_t session) {
-    event_v1 event{};
+  /// An event of `session`, from a person, about the fault at `seq` of the controller named `receiver`.
+  void ask_for_reset(std::int64_t session, std::int64_t receiver, std::int64_t seq) {
+    event_v2 event{};
     event.session = session;
+    event.receiver = receiver;
+    event.seq = seq;
     event.artifact_hash = law_.hash_prefix();
     event.source = static_cast<std::int32_t>(Side::kOperator);
     event.code = static_cast<std::int32_t>(EventCode::kReset);
@@ -82,7 +84,7 @@ class OverALink : public ::testing::Test {
 };
 
 TEST_F(OverALink, a_reading_and_a_command_keep_their_numbers) {
-  measurement_v1 sent = measurement(4, {0.1, 0.2, 0.3});
+  measurement_v2 sent = measurement(4, {0.1, 0.2, 0.3});
   sent.speed_rad_s[2] = -5.0;
   plant_.send(sent);
   RobotReading reading;
@@ -93,7 +95,7 @@ TEST_F(OverALink, a_reading_and_a_command_keep_their_numbers) {
   EXPECT_LE(reading.taken_ns, monotonic_ns());
 
   robot_.write({4, {1.0, 2.0, 3.0}, ControllerState::kDegraded, kSlewLimited});
-  command_v1 command{};
+  command_v2 command{};
   ASSERT_TRUE(plant_.receive(kSecond));
   ASSERT_TRUE(plant_.take(command));
   EXPECT_EQ(command.seq, 4);
@@ -102,14 +104,28 @@ TEST_F(OverALink, a_reading_and_a_command_keep_their_numbers) {
   EXPECT_EQ(command.flags, static_cast<std::int32_t>(kSlewLimited));
 }
 
-TEST_F(OverALink, a_reset_is_heard_with_the_right_session_only) {
-  ask_for_reset(identity_of(law_).session + 1);
+TEST_F(OverALink, a_reset_is_heard_with_the_right_session_and_controller_and_fault_only) {
+  const std::int64_t session = identity_of(law_).session;
+  const std::int64_t controller = ends_.first->sender();
+  robot_.write({19, {}, ControllerState::kRunning, kStepHealthy});
+  ask_for_reset(session, controller, 19);
+  EXPECT_EQ(robot_.take_request(), RobotRequest::kNone) << "there is no fault";
+  for (std::int64_t seq = 20; seq < 30; ++seq) {
+    robot_.write({seq, {}, ControllerState::kFault, kStepHealthy});
+  }
+  ask_for_reset(session + 1, controller, 25);
+  ask_for_reset(session, controller + 1, 25);
+  ask_for_reset(session, 0, 25);
+  ask_for_reset(session, controller, 19);
+  ask_for_reset(session, controller, 30);
   EXPECT_EQ(robot_.take_request(), RobotRequest::kNone);
-  ask_for_reset(identity_of(law_).session);
+  EXPECT_EQ(ends_.first->counters().unfit_events, 5);
+  ask_for_reset(session, controller, 25);
   EXPECT_EQ(robot_.take_request(), RobotRequest::kResetFault);
 }
 
 TEST_F(OverALink, an_end_is_heard_from_the_plant_although_another_event_came_after_it) {
+  plant_.send(measurement(6));
   plant_.send(EventCode::kEnded, 7);
   plant_.send(EventCode::kStarted, 0);
   RobotReading reading;

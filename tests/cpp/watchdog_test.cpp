@@ -25,6 +25,16 @@ TEST(Watchdog, when_the_last_command_acts_at_the_end_of_its_sample_expect_the_wh
   EXPECT_EQ(held_samples(kPeriodNs, kHoldNs - 1), 19);
 }
 
+TEST(Watchdog, F26_when_the_process_did_not_run_for_longer_than_the_hold_time_expect_the_brake_until_the_next_command) {
+  Watchdog watchdog(kHoldNs, kPeriodNs);
+  watchdog.command_at(0);
+  watchdog.stalled();
+  EXPECT_TRUE(watchdog.takes_over());
+  EXPECT_TRUE(watchdog.takes_over());
+  watchdog.command_at(0);
+  EXPECT_FALSE(watchdog.takes_over());
+}
+
 TEST(Watchdog, counts_from_the_moment_the_command_acted) {
   EXPECT_EQ(held_samples(0, kHoldNs), 19);
   EXPECT_EQ(held_samples(0, kHoldNs - 1), 18);

@@ -21,10 +21,11 @@ std::string message_seed(char channel) {
   Message message{};
   message.session = 42;
   message.artifact_hash = -7;
-  if constexpr (!std::is_same_v<Message, event_v1>) {
+  if constexpr (!std::is_same_v<Message, event_v2>) {
     message.joints = 3;
   } else {
-    message.source = static_cast<std::int32_t>(Side::kOperator);
+    message.source = static_cast<std::int32_t>(Side::kController);
+    message.code = static_cast<std::int32_t>(EventCode::kStarted);
   }
   Packet packet;
   encode(message, packet);
@@ -48,7 +49,7 @@ int main(int argc, char** argv) {
   Json watched = artifact_table("dob-acceleration", 1);
   watched["law"]["lyapunov_bound"] = TestArm{1}.lyapunov_bound();
   write_twins("lyapunov-bound", watched);
-  write(folder / "message" / "measurement", message_seed<measurement_v1>(0));
-  write(folder / "message" / "command", message_seed<command_v1>(1));
-  write(folder / "message" / "event", message_seed<event_v1>(2));
+  write(folder / "message" / "measurement", message_seed<measurement_v2>(0));
+  write(folder / "message" / "command", message_seed<command_v2>(1));
+  write(folder / "message" / "event", message_seed<event_v2>(2));
 }

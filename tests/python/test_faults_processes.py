@@ -96,7 +96,7 @@ def test_F16_when_the_simulator_is_killed_expect_the_safe_torque_within_the_watc
     experiment.set_duration(3600.0)
     commands = []
     wire = lcm.LCM(experiment.url)
-    hearing = wire.subscribe("QLPV_COMMAND", lambda _, data: commands.append(message_types.command_v1.decode(data)))
+    hearing = wire.subscribe("QLPV_COMMAND", lambda _, data: commands.append(message_types.command_v2.decode(data)))
     hearing.set_queue_capacity(0)
     for _ in range(STALLS):
         while wire.handle_timeout(20):

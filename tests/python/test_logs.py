@@ -32,7 +32,7 @@ from quasilpv.telemetry import LOG_NAME, Event, RunLog, latest_log, read_events,
 from quasilpv.telemetry.codes import event_in_words
 from quasilpv.telemetry.log import point_to
 from quasilpv.telemetry.mcap_export import as_json, json_schema
-from quasilpv.telemetry.message_types import CHANNELS, message_type, parse_definition
+from quasilpv.telemetry.message_types import CHANNELS, channel_type, message_type, parse_definition
 from quasilpv.telemetry.replay import replay
 from quasilpv.trajectories import rest
 from two_processes import executable
@@ -79,14 +79,14 @@ def edited(path: Path, target: Path, change: Any) -> Path:
 
 def resealed(event: Event, **members: Any) -> Event:
     """The event with other members and a correct checksum."""
-    kind = message_type(CHANNELS[event.channel])
+    kind = channel_type(event.channel)
     records = np.frombuffer(event.data, kind.record).copy()
     for name, value in members.items():
         records[name] = value
     return event._replace(data=kind.encode(records)[0])
 
 
-@pytest.mark.parametrize("name", CHANNELS.values())
+@pytest.mark.parametrize("name", [name for names in CHANNELS.values() for name in names])
 def test_when_a_message_is_encoded_expect_the_bytes_of_the_code_that_lcm_generates(
     name: str, message_types: ModuleType
 ) -> None:
@@ -110,7 +110,7 @@ def test_when_a_message_is_encoded_expect_the_bytes_of_the_code_that_lcm_generat
 
 
 def test_when_a_packet_is_not_exactly_a_message_expect_it_refused() -> None:
-    kind = message_type("command_v1")
+    kind = channel_type("QLPV_COMMAND")
     (packet,) = kind.encode(kind.new(1))
     assert kind.refusal(packet) is None
     assert kind.refusal(packet + b"\0") == "wrong size"
@@ -276,13 +276,35 @@ def test_when_a_log_is_replayed_expect_every_command_bit_for_bit(tracked: tuple[
     assert (shown.samples, shown.compared, shown.first_difference, shown.fault_seq) == (SAMPLES, SAMPLES, None, None)
 
 
+def test_when_a_log_is_of_the_first_version_of_the_messages_expect_the_same_samples_and_the_same_replay(
+    tracked: tuple[TrackResult, Path], tmp_path: Path
+) -> None:
+    def as_first_version(_: int, event: Event) -> Event:
+        if len(CHANNELS.get(event.channel, ())) < 2:
+            return event
+        new, old = (message_type(name) for name in CHANNELS[event.channel])
+        records = old.new(1)
+        for member in old.record.names[1:-1]:
+            records[member] = np.frombuffer(event.data, new.record)[member]
+        return event._replace(data=old.encode(records)[0])
+
+    now, before = read_log(tracked[1]), read_log(edited(tracked[1], tmp_path / "old.lcmlog", as_first_version))
+    for channel in ("measurement", "command", "event"):
+        old = before[channel]
+        assert old.type.name == f"{channel}_v1"
+        assert (old.refused, old.records.size) == ({}, now[channel].records.size)
+        for member in old.type.record.names[1:-1]:
+            np.testing.assert_array_equal(old.records[member], now[channel].records[member])
+    assert replay(before) == replay(now)
+
+
 def test_when_one_bit_of_one_command_is_another_expect_the_replay_to_name_it(
     tracked: tuple[TrackResult, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def flip(_: int, event: Event) -> Event:
         if event.channel != "QLPV_COMMAND":
             return event
-        command = np.frombuffer(event.data, message_type("command_v1").record)[0]
+        command = np.frombuffer(event.data, channel_type("QLPV_COMMAND").record)[0]
         torque = command["torque_nm"].astype(float)
         if command["seq"] != 123:
             return event
@@ -304,7 +326,7 @@ def test_when_measurements_were_missed_expect_them_from_telemetry_and_without_bo
         def drop(_: int, event: Event) -> Event | None:
             if event.channel not in channels:
                 return event
-            record = np.frombuffer(event.data, message_type(CHANNELS[event.channel]).record)[0]
+            record = np.frombuffer(event.data, channel_type(event.channel).record)[0]
             return None if record["seq"] == 40 else event
 
         return read_log(edited(tracked[1], tmp_path / "missing.lcmlog", drop))
@@ -426,7 +448,7 @@ def test_when_a_log_is_inspected_expect_counts_rates_and_the_hash(
     ],
 )
 def test_an_event_is_told_in_words(source: int, code: int, cause: int, words: str) -> None:
-    (event,) = message_type("event_v1").new(1)
+    (event,) = channel_type("QLPV_EVENT").new(1)
     event["source"], event["code"], event["detail"][0] = source, code, cause
     assert event_in_words(event) == words
 
@@ -479,7 +501,7 @@ def test_when_the_last_messages_of_a_channel_are_lost_expect_them_counted_as_mis
 
 
 def test_when_a_number_is_not_finite_expect_null_in_json() -> None:
-    kind = message_type("measurement_v1")
+    kind = channel_type("QLPV_MEASUREMENT")
     (record,) = kind.new(1)
     record["joints"], record["angle_rad"] = 2, np.nan
     tree = as_json(kind, record)
@@ -502,7 +524,7 @@ def test_when_two_processes_talk_expect_their_traffic_in_the_log_and_a_replay_bi
         theirs, ours = heard[channel].samples, made[channel].samples
         assert theirs.size >= 0.9 * SAMPLES  # a busy machine may lose some
         ours = ours[np.isin(ours["seq"], theirs["seq"])]
-        for name in set(theirs.dtype.names) - {"utime", "session", "crc", *own}:
+        for name in set(theirs.dtype.names) - {"utime", "session", "sender", "receiver", "crc", *own}:
             np.testing.assert_array_equal(theirs[name], ours[name], err_msg=f"{channel}.{name}")
     assert np.all(heard["telemetry"].samples["step_ns"] > 0)
     assert replay(heard).first_difference is None

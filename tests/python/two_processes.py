@@ -134,19 +134,22 @@ class WirePlant:
         self._session = experiment.session
         self._hash = int.from_bytes(bytes.fromhex(artifact.hash)[:8], "big", signed=True)
         self._joints = artifact.joints
+        self._sender = 1 + secrets.randbelow(2**63 - 1)
+        self._period_ns = round(1e9 * artifact.sample_period_s)
         self._commands: list[Any] = []
         self._wire = lcm.LCM(experiment.url)
         self._wire.subscribe("QLPV_COMMAND", self._hear)
 
     def _hear(self, _: str, data: bytes) -> None:
-        command = self._types.command_v1.decode(data)
+        command = self._types.command_v2.decode(data)
         assert command.crc == zlib.crc32(data[:-8])
         self._commands.append(command)
 
     def send(self, seq: int, angles: Sequence[float], *, session_offset: int = 0) -> None:
-        message = self._types.measurement_v1()
+        message = self._types.measurement_v2()
         message.seq, message.session, message.artifact_hash = seq, self._session + session_offset, self._hash
         message.joints = self._joints
+        message.sender, message.period_ns = self._sender, self._period_ns
         message.angle_rad = [*angles, *[0.0] * (7 - len(angles))]
         message.crc = zlib.crc32(message.encode()[:-8])
         self._wire.publish("QLPV_MEASUREMENT", message.encode())

@@ -55,6 +55,7 @@ Json describe(const ControlLoop& loop, const ControllerRunReport& run, const Tel
   return {{"end", to_string(run.end)},
           {"state", to_string(loop.state())},
           {"fault_cause", to_string(loop.cause())},
+          {"robot_fault", to_string(run.robot_fault)},
           {"steps", loop.steps()},
           {"predicted_steps", loop.predicted_steps()},
           {"last_seq", loop.last_seq()},
@@ -78,16 +79,30 @@ Json describe(const ControlLoop& loop, const ControllerRunReport& run, const Tel
           {"post_mortem", to_json(loop.post_mortem(), loop.cause(), loop.joints())}};
 }
 
-int exit_code(const ControlLoop& loop, const ControllerRunReport& run, const CommonOptions& options) {
+/// Why the run counts as stopped by a fault; empty if it does not.
+std::string fault_stop_reason(const ControlLoop& loop, const ControllerRunReport& run, const Link& link) {
+  if (loop.state() == ControllerState::kFault && loop.cause() != FaultCause::kStopRequested) {
+    return naming(to_string(loop.cause()), link);
+  }
+  if (run.robot_fault != FaultCause::kNone) {
+    return naming(to_string(run.robot_fault), link);
+  }
+  return run.end == ControllerRunEnd::kPlantSilent ? to_string(run.end) : "";
+}
+
+int exit_code(const ControlLoop& loop, const ControllerRunReport& run, const Link& link, const CommonOptions& options) {
+  if (run.end == ControllerRunEnd::kRefused) {
+    throw_refused(options, link, "the plant");
+  }
   if (run.end == ControllerRunEnd::kPlantNeverHeard) {
-    throw_never_heard(options, "measurement", "qlpv-simulator");
+    throw_never_heard(options, link, "measurement", "qlpv-simulator");
   }
-  const bool ended_in_fault = loop.state() == ControllerState::kFault && loop.cause() != FaultCause::kStopRequested;
-  if (!ended_in_fault && run.end != ControllerRunEnd::kPlantSilent) {
-    return kExitDone;
+  warn_of_other_run("qlpv-controller", link, options.url);
+  if (run.robot_fault == FaultCause::kPlantFailed) {
+    throw PlantError("the plant says that it failed after sample " + std::to_string(loop.last_seq()));
   }
-  const char* reason = ended_in_fault ? to_string(loop.cause()) : to_string(run.end);
-  return report_fault_stop("qlpv-controller", reason, loop.last_seq());
+  const std::string reason = fault_stop_reason(loop, run, link);
+  return reason.empty() ? kExitDone : report_fault_stop("qlpv-controller", reason, loop.last_seq());
 }
 
 int run(const CLI::App& app, Options& options) {
@@ -113,7 +128,7 @@ int run(const CLI::App& app, Options& options) {
   const ControllerRunReport report = run_controller(loop, robot, options.run, install_stop_signals());
   const TelemetryReport telemetry = publisher.stop();
   print_report(std::cout, describe(loop, report, telemetry, link, options.loop.realtime), common.json);
-  return exit_code(loop, report, common);
+  return exit_code(loop, report, link, common);
 }
 
 struct DoctorOptions {
@@ -228,7 +243,7 @@ int run_reset(const CommonOptions& options) {
     case ResetOutcome::kSilent:
       break;
   }
-  throw_never_heard(options, "command", "qlpv-controller");
+  throw_never_heard(options, link, "command", "qlpv-controller");
 }
 
 }  // namespace

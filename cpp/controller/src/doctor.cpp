@@ -132,9 +132,9 @@ LatencyHistogram measure_step(const Artifact& artifact, std::int64_t samples) {
 
 LatencyHistogram measure_round_trip(Link& plant, Link& controller, std::int64_t period_ns, std::int64_t samples) {
   return once_per_period(period_ns, samples, [&](std::int64_t k, std::int64_t /*tick*/) -> std::int64_t {
-    measurement_v1 measurement{};
+    measurement_v2 measurement{};
     measurement.seq = k;
-    command_v1 command{};
+    command_v2 command{};
     command.seq = k;
     const std::int64_t start_ns = monotonic_ns();
     const auto remaining_ns = [&] { return start_ns + kLongestRoundTripNs - monotonic_ns(); };

@@ -9,6 +9,9 @@ FaultCause fault_cause(const FailsafeSettings& settings, const FailsafeFlags& fl
   if (flags.stop_requested) {
     return FaultCause::kStopRequested;
   }
+  if (flags.demanded != FaultCause::kNone) {
+    return flags.demanded;
+  }
   if (flags.plant_silent) {
     return FaultCause::kPlantSilent;
   }
@@ -61,6 +64,12 @@ const char* to_string(FaultCause cause) noexcept {
       return "premise outside its box";
     case FaultCause::kStopRequested:
       return "stop requested";
+    case FaultCause::kSecondPlant:
+      return "second plant on this session";
+    case FaultCause::kSecondController:
+      return "second controller on this session";
+    case FaultCause::kPlantFailed:
+      return "plant failed";
   }
   return "unknown";
 }

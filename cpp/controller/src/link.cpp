@@ -1,22 +1,53 @@
 #include "quasilpv/link.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <type_traits>
 
+#include "quasilpv/failsafe.hpp"
 #include "quasilpv/realtime.hpp"
 
 namespace quasilpv {
+namespace {
 
-void Link::send(const measurement_v1& message) noexcept { seal_and_transmit(message); }
-void Link::send(const command_v1& message) noexcept { seal_and_transmit(message); }
+template <class Message>
+Speaker speaker_of(const Message& message) noexcept {
+  return {message.sender, static_cast<Pace>(message.mode), message.period_ns};
+}
+
+template <std::size_t size>
+bool are_identical(const double (&a)[size], const double (&b)[size]) noexcept {
+  return std::memcmp(a, b, sizeof(a)) == 0;  // NaN is a value here
+}
+
+/// Whether two messages about one sample say the same; their time may differ.
+bool agree(const measurement_v2& a, const measurement_v2& b) noexcept {
+  return a.flags == b.flags && are_identical(a.angle_rad, b.angle_rad) && are_identical(a.speed_rad_s, b.speed_rad_s);
+}
+bool agree(const command_v2& a, const command_v2& b) noexcept {
+  return a.state == b.state && a.flags == b.flags && are_identical(a.torque_nm, b.torque_nm);
+}
+
+}  // namespace
+
+void Link::send(const measurement_v2& message) noexcept { seal_and_transmit(message); }
+void Link::send(const command_v2& message) noexcept {
+  const bool in_fault = message.state == static_cast<std::int32_t>(ControllerState::kFault);
+  if (!in_fault || fault_seq_ < 0) {
+    fault_seq_ = in_fault ? message.seq : -1;
+  }
+  last_command_seq_ = message.seq;
+  seal_and_transmit(message);
+}
 void Link::send(const telemetry_v1& message) noexcept { seal_and_transmit(message); }
 
-void Link::send(EventCode code, std::int64_t seq, std::int64_t detail) noexcept {
-  event_v1 event{};
+void Link::send(EventCode code, std::int64_t seq, std::int64_t detail, std::int64_t more) noexcept {
+  event_v2 event{};
   event.seq = seq;
   event.source = static_cast<std::int32_t>(side_);
   event.code = static_cast<std::int32_t>(code);
   event.detail[0] = detail;
+  event.detail[1] = more;
   seal_and_transmit(event);
 }
 
@@ -28,7 +59,15 @@ void Link::seal_and_transmit(Message message) noexcept {
   message.utime = monotonic_ns() / kNanosecondsPerMicrosecond;
   message.session = identity_.session;
   message.artifact_hash = identity_.artifact_hash;
-  if constexpr (std::is_same_v<Message, event_v1>) {
+  if constexpr (!std::is_same_v<Message, telemetry_v1>) {
+    message.sender = sender_;
+    message.mode = static_cast<std::int32_t>(identity_.pace);
+    message.period_ns = identity_.period_ns;
+  }
+  if constexpr (std::is_same_v<Message, command_v2> || std::is_same_v<Message, event_v2>) {
+    message.receiver = peers_.peer();
+  }
+  if constexpr (std::is_same_v<Message, event_v2>) {
     // No two events of a side have one time: in authenticated mode an equal one is a replayed one.
     message.utime = last_event_utime_ = std::max(message.utime, last_event_utime_ + 1);
   } else {
@@ -78,16 +117,55 @@ DecodeStatus Link::open(const void* bytes, std::size_t size, Message& message) c
 template <class Message>
 void Link::accept_into(Inbox<Message>& inbox, const void* bytes, std::size_t size) noexcept {
   Message message;
-  if (count(open(bytes, size, message))) {
+  const DecodeStatus status = open(bytes, size, message);
+  look_at_foreign(status, message);
+  if (count(status) && is_of_peer(inbox, message)) {
     file(inbox, message);
   }
 }
 
+template <class Message>
+void Link::look_at_foreign(DecodeStatus status, const Message& message) noexcept {
+  if (status == DecodeStatus::kWrongSession) {
+    foreign_session_ = message.session;
+  } else if (status == DecodeStatus::kWrongArtifact && !peers_.has_peer() && message.period_ns != identity_.period_ns) {
+    peers_.fits(speaker_of(message));  // another artifact, of another rate: this can become no run
+  }
+}
+
+template <class Message>
+bool Link::is_of_peer(Inbox<Message>& inbox, const Message& message) noexcept {
+  if constexpr (std::is_same_v<Message, command_v2>) {
+    if (side_ == Side::kPlant && message.receiver != 0 && message.receiver != sender_) {
+      ++counters_.second_sender;
+      peers_.hears_twin(message.receiver);
+      return false;
+    }
+  }
+  const std::int64_t takeovers = peers_.takeovers();
+  if (peers_.hears(speaker_of(message))) {
+    if (peers_.takeovers() > takeovers) {
+      inbox = {};
+    }
+    return true;
+  }
+  ++(peers_.has_peer() ? counters_.second_sender : counters_.other_mode);
+  return false;
+}
+
 void Link::accept_event(const void* bytes, std::size_t size) noexcept {
-  event_v1 event;
+  event_v2 event;
   DecodeStatus status = open(bytes, size, event);
   // Both sides send on the channel of events, and multicast hands every sender its own packets back.
-  if (status == DecodeStatus::kAccepted && event.source == static_cast<std::int32_t>(side_)) {
+  if (status == DecodeStatus::kAccepted && event.sender == sender_) {
+    return;
+  }
+  if (status == DecodeStatus::kWrongSession ||
+      (status == DecodeStatus::kWrongArtifact && event.source != static_cast<std::int32_t>(side_))) {
+    look_at_foreign(status, event);
+  }
+  if (status == DecodeStatus::kAccepted && !fits(event)) {
+    ++counters_.unfit_events;
     return;
   }
   if (status == DecodeStatus::kAccepted && key_ && is_replayed(event)) {
@@ -100,17 +178,44 @@ void Link::accept_event(const void* bytes, std::size_t size) noexcept {
   }
 }
 
+bool Link::fits(const event_v2& event) noexcept {
+  const auto source = static_cast<Side>(event.source);
+  const auto code = static_cast<EventCode>(event.code);
+  if (source == Side::kOperator) {
+    // A reset is meant for this controller and for the fault it is in, not for one before it.
+    return side_ == Side::kController && code == EventCode::kReset && event.receiver == sender_ && fault_seq_ >= 0 &&
+           fault_seq_ <= event.seq && event.seq <= last_command_seq_;
+  }
+  if (source == side_) {
+    if (!peers_.has_peer() && (code == EventCode::kStarted || code == EventCode::kFault)) {
+      peers_.hears_twin(event.sender);
+    }
+    return false;
+  }
+  return fits(event, side_ == Side::kController ? measurement_.newest_seq : command_.newest_seq);
+}
+
+/// An event of the other side: of the peer, and not older than what it last said about a sample.
+bool Link::fits(const event_v2& event, std::int64_t newest_seq) noexcept {
+  const auto code = static_cast<EventCode>(event.code);
+  if (!peers_.has_peer()) {
+    return peers_.fits(speaker_of(event)) && code == EventCode::kStarted;
+  }
+  return peers_.is_peer(event.sender) && code != EventCode::kReset &&
+         (code != EventCode::kEnded || event.seq >= newest_seq);
+}
+
 // Measurements and commands are told apart by their seq, events only by their time.
-bool Link::is_replayed(const event_v1& event) noexcept {
-  const auto source = static_cast<std::size_t>(event.source) - 1;  // of an authentic event
-  if (source >= kSides || event.utime <= newest_event_utime_[source]) {
+bool Link::is_replayed(const event_v2& event) noexcept {
+  const auto source = static_cast<std::size_t>(event.source) - 1;
+  if (event.utime <= newest_event_utime_[source]) {
     return true;
   }
   newest_event_utime_[source] = event.utime;
   return false;
 }
 
-bool Link::EventQueue::put(const event_v1& event) noexcept {
+bool Link::EventQueue::put(const event_v2& event) noexcept {
   if (count == kCapacity) {
     return false;
   }
@@ -119,7 +224,7 @@ bool Link::EventQueue::put(const event_v1& event) noexcept {
   return true;
 }
 
-bool Link::EventQueue::take(event_v1& event) noexcept {
+bool Link::EventQueue::take(event_v2& event) noexcept {
   if (count == 0) {
     return false;
   }
@@ -152,6 +257,9 @@ bool Link::count(DecodeStatus status) noexcept {
     case DecodeStatus::kWrongType:
       ++counters_.wrong_type;
       return false;
+    case DecodeStatus::kOutOfBounds:
+      ++counters_.out_of_bounds;
+      return false;
     case DecodeStatus::kWrongSession:
       ++counters_.wrong_session;
       break;
@@ -171,6 +279,11 @@ void Link::file(Inbox<Message>& inbox, const Message& message) noexcept {
     return;
   }
   if (message.seq == inbox.newest_seq) {
+    if (!agree(message, inbox.newest)) {
+      ++counters_.second_sender;
+      peers_.hears_contradiction();
+      return;
+    }
     ++counters_.duplicates;
   } else {
     ++counters_.accepted;

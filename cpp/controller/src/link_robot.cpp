@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace quasilpv {
 namespace {
@@ -20,9 +21,19 @@ EventCode event_code(ControllerNews news) noexcept {
   return EventCode::kEnded;
 }
 
+/// Why the plant ended; a plant may say only what it can know.
+FaultCause cause_of(const event_v2& ended) noexcept {
+  for (const FaultCause cause : {FaultCause::kSecondController, FaultCause::kPlantFailed}) {
+    if (ended.detail[0] == static_cast<std::int64_t>(cause)) {
+      return cause;
+    }
+  }
+  return FaultCause::kNone;
+}
+
 }  // namespace
 
-RobotReading to_reading(const measurement_v1& message) noexcept {
+RobotReading to_reading(const measurement_v2& message) noexcept {
   RobotReading reading;
   reading.seq = message.seq;
   reading.taken_ns = message.utime * kNanosecondsPerMicrosecond;
@@ -31,8 +42,8 @@ RobotReading to_reading(const measurement_v1& message) noexcept {
   return reading;
 }
 
-command_v1 to_message(const RobotCommand& command) noexcept {
-  command_v1 message{};
+command_v2 to_message(const RobotCommand& command) noexcept {
+  command_v2 message{};
   message.seq = command.seq;
   message.state = static_cast<std::int32_t>(command.state);
   message.flags = static_cast<std::int32_t>(command.flags);
@@ -41,7 +52,7 @@ command_v1 to_message(const RobotCommand& command) noexcept {
 }
 
 bool LinkRobot::read(RobotReading& reading, std::int64_t timeout_ns) noexcept {
-  measurement_v1 message;
+  measurement_v2 message;
   link_.receive(timeout_ns);
   if (!link_.take(message)) {
     return false;
@@ -53,21 +64,48 @@ bool LinkRobot::read(RobotReading& reading, std::int64_t timeout_ns) noexcept {
 void LinkRobot::write(const RobotCommand& command) noexcept { link_.send(to_message(command)); }
 
 RobotRequest LinkRobot::take_request() noexcept {
-  event_v1 event;
+  notice_conflict();
+  if (refused_) {
+    return RobotRequest::kRefuse;
+  }
+  event_v2 event;
   while (link_.take(event)) {
-    const bool from_plant = event.source == static_cast<std::int32_t>(Side::kPlant);
-    if (from_plant && event.code == static_cast<std::int32_t>(EventCode::kEnded)) {
+    const auto code = static_cast<EventCode>(event.code);
+    if (code == EventCode::kEnded) {
+      fault_ = cause_of(event);
       return RobotRequest::kEnd;
     }
-    if (event.code == static_cast<std::int32_t>(EventCode::kReset)) {
+    if (code == EventCode::kReset) {
       return RobotRequest::kResetFault;
     }
   }
   return RobotRequest::kNone;
 }
 
+FaultCause LinkRobot::take_fault() noexcept {
+  notice_conflict();
+  return std::exchange(fault_, FaultCause::kNone);
+}
+
+void LinkRobot::notice_conflict() noexcept {
+  switch (link_.peers().take_conflict()) {
+    case Conflict::kNone:
+      break;
+    case Conflict::kSecondPlant:
+      fault_ = FaultCause::kSecondPlant;
+      break;
+    case Conflict::kSecondController:
+      fault_ = FaultCause::kSecondController;
+      break;
+    case Conflict::kOtherMode:
+    case Conflict::kOtherRate:
+      refused_ = true;
+      break;
+  }
+}
+
 void LinkRobot::announce(ControllerNews news, std::int64_t seq, FaultCause cause) noexcept {
-  link_.send(event_code(news), seq, static_cast<std::int64_t>(cause));
+  link_.send(event_code(news), std::max<std::int64_t>(seq, 0), static_cast<std::int64_t>(cause));
 }
 
 }  // namespace quasilpv

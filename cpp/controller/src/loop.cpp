@@ -111,6 +111,7 @@ void ControlLoop::judge(const StepReport& report, const SampleConditions& condit
   observed.law_invalid = (report.flags & (kTorqueNotFinite | kModelInvalid)) != 0;
   observed.plant_silent = plant_silent;
   observed.stop_requested = conditions.stop_requested;
+  observed.demanded = conditions.demanded;
   observed_ = observed;
   const bool was_fault = failsafe_.state == ControllerState::kFault;
   failsafe_ = next_state(settings_.failsafe, failsafe_, observed, conditions.now_ns);

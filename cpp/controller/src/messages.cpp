@@ -1,8 +1,12 @@
 #include "quasilpv/messages.hpp"
 
+#include <unistd.h>
+
+#include <random>
 #include <type_traits>
 
 #include "quasilpv/crc32.hpp"
+#include "quasilpv/failsafe.hpp"
 
 namespace quasilpv {
 namespace {
@@ -31,14 +35,53 @@ void write_big_endian(std::uint64_t value, std::uint8_t* bytes) noexcept {
 
 template <class Message>
 bool joints_agree(const Message& message, const WireIdentity& identity) noexcept {
-  if constexpr (std::is_same_v<Message, event_v1>) {
+  if constexpr (std::is_same_v<Message, event_v2>) {
     return true;
   } else {
     return message.joints == identity.joints;
   }
 }
 
+constexpr bool is_within(std::int64_t value, std::int64_t low, std::int64_t high) noexcept {
+  return low <= value && value <= high;
+}
+
+bool is_within_bounds(const measurement_v2& /*message*/) noexcept { return true; }
+bool is_within_bounds(const command_v2& message) noexcept {
+  return is_within(message.state, static_cast<int>(ControllerState::kInit), static_cast<int>(ControllerState::kFault));
+}
+bool is_within_bounds(const event_v2& message) noexcept {
+  return is_within(message.source, static_cast<int>(Side::kController), static_cast<int>(Side::kOperator)) &&
+         is_within(message.code, static_cast<int>(EventCode::kStarted), static_cast<int>(EventCode::kReset));
+}
+
+/// Angles and torques may be any double: what reads them says what it does with them.
+template <class Message>
+bool has_times_within_bounds(const Message& message, std::int64_t period_ns) noexcept {
+  constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
+  return is_within(message.utime, 0, kLongestTimeNs / kNanosecondsPerMicrosecond) &&
+         is_within(message.seq, 0, kLongestTimeNs / (period_ns > 0 ? period_ns : 1));
+}
+
+template <class Message>
+bool is_possible(const Message& message, const WireIdentity& identity) noexcept {
+  if constexpr (std::is_same_v<Message, telemetry_v1>) {
+    return has_times_within_bounds(message, identity.period_ns);
+  } else {
+    return has_times_within_bounds(message, identity.period_ns) && is_within(message.period_ns, 0, kLongestTimeNs) &&
+           is_within(message.mode, static_cast<int>(Pace::kLockStep), static_cast<int>(Pace::kRealTime)) &&
+           is_within_bounds(message);
+  }
+}
+
 }  // namespace
+
+std::int64_t new_sender() {
+  std::random_device random;
+  const std::uint64_t high = (static_cast<std::uint64_t>(random()) << 32 | random()) >> 1;
+  const std::uint64_t process = static_cast<std::uint64_t>(getpid()) & 0x3FFFFF;
+  return static_cast<std::int64_t>((high & ~std::uint64_t{0x3FFFFF}) | process);
+}
 
 const char* channel_name(Channel channel) noexcept {
   static constexpr std::array<const char*, kChannels> kNames = {"QLPV_MEASUREMENT", "QLPV_COMMAND", "QLPV_TELEMETRY",
@@ -67,23 +110,26 @@ DecodeStatus decode(const void* bytes, std::size_t size, const WireIdentity& ide
   if (candidate.decode(data, 0, static_cast<int>(size)) < 0) {
     return DecodeStatus::kWrongType;
   }
+  if (!is_possible(candidate, identity)) {
+    return DecodeStatus::kOutOfBounds;
+  }
+  message = candidate;
   if (candidate.session != identity.session) {
     return DecodeStatus::kWrongSession;
   }
   if (candidate.artifact_hash != identity.artifact_hash || !joints_agree(candidate, identity)) {
     return DecodeStatus::kWrongArtifact;
   }
-  message = candidate;
   return DecodeStatus::kAccepted;
 }
 
-template void encode(const measurement_v1&, Packet&) noexcept;
-template void encode(const command_v1&, Packet&) noexcept;
+template void encode(const measurement_v2&, Packet&) noexcept;
+template void encode(const command_v2&, Packet&) noexcept;
 template void encode(const telemetry_v1&, Packet&) noexcept;
-template void encode(const event_v1&, Packet&) noexcept;
-template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, measurement_v1&) noexcept;
-template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, command_v1&) noexcept;
+template void encode(const event_v2&, Packet&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, measurement_v2&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, command_v2&) noexcept;
 template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, telemetry_v1&) noexcept;
-template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, event_v1&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, event_v2&) noexcept;
 
 }  // namespace quasilpv

@@ -1,5 +1,7 @@
 #include "quasilpv/reset_fault.hpp"
 
+#include <algorithm>
+
 #include "quasilpv/failsafe.hpp"
 #include "quasilpv/realtime.hpp"
 
@@ -9,19 +11,19 @@ ResetOutcome request_reset(Link& link, double timeout_s) {
   constexpr std::int64_t kRepeatNs = 100 * kNanosecondsPerMillisecond;
   const std::int64_t end_ns = monotonic_ns() + to_nanoseconds(timeout_s);
   ResetOutcome outcome = ResetOutcome::kSilent;
-  for (std::int64_t now_ns = monotonic_ns(); now_ns < end_ns; now_ns = monotonic_ns()) {
-    link.send(EventCode::kReset, 0);
-    const std::int64_t repeat_ns = now_ns + kRepeatNs;
-    for (; now_ns < repeat_ns; now_ns = monotonic_ns()) {
-      command_v1 command;
-      link.receive(repeat_ns - now_ns);
-      if (!link.take(command)) {
-        continue;
-      }
-      if (command.state != static_cast<std::int32_t>(ControllerState::kFault)) {
-        return ResetOutcome::kLeft;
-      }
-      outcome = ResetOutcome::kStillFault;
+  std::int64_t asked_ns = monotonic_ns();  // a command says whom to ask, and about which fault: listen first
+  command_v2 command{};
+  for (std::int64_t now_ns = asked_ns; now_ns < end_ns; now_ns = monotonic_ns()) {
+    link.receive(std::min(end_ns, asked_ns + kRepeatNs) - now_ns);
+    const bool heard = link.take(command);
+    if (heard && command.state != static_cast<std::int32_t>(ControllerState::kFault)) {
+      return ResetOutcome::kLeft;
+    }
+    const bool first = heard && outcome == ResetOutcome::kSilent;
+    outcome = heard ? ResetOutcome::kStillFault : outcome;
+    if (first || monotonic_ns() - asked_ns >= kRepeatNs) {
+      asked_ns = monotonic_ns();
+      link.send(EventCode::kReset, command.seq);
     }
   }
   return outcome;

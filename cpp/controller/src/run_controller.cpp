@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "quasilpv/realtime.hpp"
 
@@ -32,11 +33,16 @@ class ControllerRun {
       if (stop.load(std::memory_order_relaxed) && !stop_since_ns_) {
         stop_since_ns_ = now_ns_;
       }
+      notice(robot_.take_fault());
+      answer_silence();  // first: a reading that ends a silence, as after a stop of both sides, must not hide it
       if (read) {
         answer(reading);
       }
-      answer_silence();
       end = find_end();
+    }
+    notice(robot_.take_fault());
+    if (!loop_.started() && report_.robot_fault != FaultCause::kNone) {
+      robot_.announce(ControllerNews::kFault, 0, report_.robot_fault);  // no sample will say so
     }
     robot_.announce(ControllerNews::kEnded, loop_.last_seq(), loop_.cause());
     report_.end = *end;
@@ -49,8 +55,15 @@ class ControllerRun {
   // Simulated time in lock-step: the fail-safe policy must not depend on how fast this machine is.
   std::int64_t policy_clock(std::int64_t seq) const noexcept { return is_real_time() ? now_ns_ : seq * period_ns_; }
 
-  SampleConditions conditions(std::int64_t seq) const noexcept {
-    return {policy_clock(seq), consecutive_overruns_, robot_.take_longest_foreign_run(), stop_since_ns_.has_value()};
+  SampleConditions conditions(std::int64_t seq) noexcept {
+    return {policy_clock(seq), consecutive_overruns_, robot_.take_longest_foreign_run(), stop_since_ns_.has_value(),
+            std::exchange(demanded_, FaultCause::kNone)};
+  }
+
+  void notice(FaultCause fault) noexcept {
+    if (fault != FaultCause::kNone) {
+      demanded_ = report_.robot_fault = fault;
+    }
   }
 
   std::int64_t wait_ns() const noexcept {
@@ -116,6 +129,12 @@ class ControllerRun {
     if (request == RobotRequest::kEnd) {
       return ControllerRunEnd::kPlantEnded;
     }
+    if (request == RobotRequest::kRefuse) {
+      return ControllerRunEnd::kRefused;
+    }
+    if (!loop_.started() && report_.robot_fault != FaultCause::kNone) {
+      return ControllerRunEnd::kFault;
+    }
     if (request == RobotRequest::kResetFault) {
       report_.resets += loop_.reset_fault() ? 1 : 0;
     }
@@ -141,6 +160,7 @@ class ControllerRun {
   std::int64_t last_heard_ns_;
   std::int64_t now_ns_ = 0;
   std::int64_t consecutive_overruns_ = 0;
+  FaultCause demanded_ = FaultCause::kNone;
   std::optional<std::int64_t> stop_since_ns_;
   std::optional<Pacer> silent_pacer_;
   std::int64_t faults_announced_ = 0;
@@ -157,6 +177,8 @@ const char* to_string(ControllerRunEnd end) noexcept {
       return "stopped";
     case ControllerRunEnd::kFault:
       return "fault";
+    case ControllerRunEnd::kRefused:
+      return "refused";
     case ControllerRunEnd::kPlantSilent:
       return "plant silent";
     case ControllerRunEnd::kPlantNeverHeard:

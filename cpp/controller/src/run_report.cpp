@@ -47,6 +47,10 @@ Json to_json(const LinkCounters& counters) {
           {"wrong_type", counters.wrong_type},
           {"wrong_session", counters.wrong_session},
           {"wrong_artifact", counters.wrong_artifact},
+          {"out_of_bounds", counters.out_of_bounds},
+          {"second_sender", counters.second_sender},
+          {"other_mode", counters.other_mode},
+          {"unfit_events", counters.unfit_events},
           {"lost_events", counters.lost_events},
           {"send_failures", counters.send_failures}};
 }

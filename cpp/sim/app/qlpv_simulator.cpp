@@ -41,7 +41,9 @@ Json describe(const PlantRunReport& run, const Link& link, bool realtime) {
           {"repeated_measurements", run.repeated},
           {"missed_commands", run.missed_commands},
           {"late_commands", run.late_commands},
+          {"refused_commands", run.refused_commands},
           {"watchdog_samples", run.watchdog_samples},
+          {"stalls", run.stalls},
           {"overruns", run.overruns},
           {"skipped_ticks", run.skipped_ticks},
           {"rt", realtime},
@@ -78,26 +80,37 @@ class RecordFile {
   Record record_;
 };
 
-/// Why the run counts as stopped by a fault, null if it does not.
-const char* fault_stop_reason(const PlantRunReport& run) {
-  if (run.end == PlantRunEnd::kControllerSilent || run.end == PlantRunEnd::kControllerEnded) {
-    return to_string(run.end);
-  }
-  if (run.end != PlantRunEnd::kCompleted) {
-    return nullptr;
+/// Why the run counts as stopped by a fault; empty if it does not.
+std::string fault_stop_reason(const PlantRunReport& run, const Link& link) {
+  switch (run.end) {
+    case PlantRunEnd::kCompleted:
+      break;
+    case PlantRunEnd::kStopped:
+      return "";
+    case PlantRunEnd::kCommandsRefused:
+      return to_string(run.end) + (": " + run.refusal);
+    default:
+      return naming(to_string(run.end), link);
   }
   if (run.watchdog_at_end) {
     return "controller silent, braked by the watchdog";
   }
-  return run.controller_state == ControllerState::kFault ? "controller in fault" : nullptr;
+  return run.controller_state == ControllerState::kFault ? "controller in fault" : "";
 }
 
-int exit_code(const PlantRunReport& run, const CommonOptions& options) {
-  if (run.end == PlantRunEnd::kControllerNeverHeard) {
-    throw_never_heard(options, "command", "qlpv-controller");
+int exit_code(const PlantRunReport& run, const Link& link, const CommonOptions& options) {
+  if (run.end == PlantRunEnd::kRefused) {
+    throw_refused(options, link, "the controller");
   }
-  const char* reason = fault_stop_reason(run);
-  return reason == nullptr ? kExitDone : report_fault_stop("qlpv-simulator", reason, run.samples);
+  if (run.end == PlantRunEnd::kControllerNeverHeard) {
+    throw_never_heard(options, link, "command", "qlpv-controller");
+  }
+  warn_of_other_run("qlpv-simulator", link, options.url);
+  if (run.refused_commands > 0 && run.end != PlantRunEnd::kCommandsRefused) {
+    std::cerr << "qlpv-simulator: warning: " << run.refused_commands << " commands refused: " << run.refusal << '\n';
+  }
+  const std::string reason = fault_stop_reason(run, link);
+  return reason.empty() ? kExitDone : report_fault_stop("qlpv-simulator", reason, run.samples);
 }
 
 int run(const CLI::App& app, Options& options) {
@@ -116,6 +129,7 @@ int run(const CLI::App& app, Options& options) {
 
   options.run.pace = common.pace;
   options.run.timeout_s = common.timeout_s;
+  options.run.torque_limit_nm = artifact.limits().torque_nm;
   options.run.brake_nm_s = viscous_brake(scenario, options.brake_time_constant_s);
   RecordFile file(common.record);
   PlantRunReport report;
@@ -127,7 +141,7 @@ int run(const CLI::App& app, Options& options) {
   }
   print_report(std::cout, describe(report, link, realtime), common.json);
   file.write();
-  return exit_code(report, common);
+  return exit_code(report, link, common);
 }
 
 }  // namespace

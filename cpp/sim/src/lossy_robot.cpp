@@ -140,7 +140,7 @@ void LossyRobot::begin_sample() {
   torque_ = session_.torque();
   delay_ns_ = 0;
   const Measurement& measured = session_.measure(session_.seq());
-  measurement_v1 message{};
+  measurement_v2 message{};
   message.seq = measured.seq;
   std::copy(measured.angle.begin(), measured.angle.end(), message.angle_rad);
   std::copy(measured.speed.begin(), measured.speed.end(), message.speed_rad_s);
@@ -160,7 +160,7 @@ void LossyRobot::finish_sample() {
 }
 
 void LossyRobot::receive_command() {
-  command_v1 command;
+  command_v2 command;
   plant_->receive(0);
   if (plant_->take(command) && command.seq > last_command_seq_) {
     last_command_seq_ = command.seq;

@@ -1,9 +1,11 @@
 #include "quasilpv/plant_loop.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <optional>
 
+#include "format_number.hpp"
 #include "quasilpv/realtime.hpp"
 #include "quasilpv/run_columns.hpp"
 #include "quasilpv/watchdog.hpp"
@@ -14,6 +16,7 @@ namespace {
 constexpr std::int64_t kRepeatPeriodNs = 50 * kNanosecondsPerMillisecond;
 constexpr std::int64_t kLongestWaitNs = 10 * kNanosecondsPerMillisecond;
 constexpr double kNoCommand = -1.0;
+constexpr double kLargestTorqueNm = 1e12;  // that a scenario may hold
 
 JointArray to_array(const double (&source)[kMaxJoints]) {
   JointArray target;
@@ -74,7 +77,7 @@ class PlantRun {
   PlantRunReport run() {
     struct SayGoodbye {
       PlantRun& run;
-      ~SayGoodbye() { run.link_.send(EventCode::kEnded, run.session_.seq()); }
+      ~SayGoodbye() { run.say_goodbye(); }
     } goodbye{*this};
     link_.send(EventCode::kStarted, 0);
     if (lock_step_sample() && settings_.pace == Pace::kRealTime) {
@@ -89,11 +92,22 @@ class PlantRun {
   }
 
  private:
+  void say_goodbye() noexcept {
+    // Without an end, and incomplete: the plant could not be integrated.
+    FaultCause cause = end_ || is_complete() ? FaultCause::kNone : FaultCause::kPlantFailed;
+    if (end_ == PlantRunEnd::kSecondController) {
+      cause = FaultCause::kSecondController;
+    } else if (end_ == PlantRunEnd::kSecondPlant) {
+      link_.send(EventCode::kFault, session_.seq(), static_cast<std::int64_t>(FaultCause::kSecondPlant));
+    }
+    link_.send(EventCode::kEnded, session_.seq(), static_cast<std::int64_t>(cause));
+  }
+
   bool is_complete() const { return session_.seq() >= session_.samples(); }
 
   void send_measurement() {
     const Measurement& measured = session_.measure(session_.seq());
-    measurement_v1 message{};
+    measurement_v2 message{};
     message.seq = measured.seq;
     std::copy(measured.angle.begin(), measured.angle.end(), message.angle_rad);
     std::copy(measured.speed.begin(), measured.speed.end(), message.speed_rad_s);
@@ -101,9 +115,13 @@ class PlantRun {
     link_.send(message);
   }
 
-  /// Newest command not seen before; notes who is alive.
-  bool take_command(command_v1& command) {
-    if (!link_.take(command) || command.seq <= last_command_seq_) {
+  /// Newest command not seen before, if it may act; notes who is alive.
+  bool take_command(command_v2& command) {
+    if (link_.peers().takeovers() != takeovers_) {
+      takeovers_ = link_.peers().takeovers();
+      last_command_seq_ = -1;  // a successor does not know how far the one before it went
+    }
+    if (!link_.take(command) || command.seq <= last_command_seq_ || is_refused(command)) {
       return false;
     }
     last_command_seq_ = command.seq;
@@ -112,25 +130,54 @@ class PlantRun {
     return true;
   }
 
+  bool is_refused(const command_v2& command) {
+    for (std::size_t j = 0; j < static_cast<std::size_t>(session_.joints()); ++j) {
+      const double torque = command.torque_nm[j];
+      const double limit = settings_.torque_limit_nm ? (*settings_.torque_limit_nm)[j] : kLargestTorqueNm;
+      if (!(std::abs(torque) <= limit)) {  // NaN is not
+        ++report_.refused_commands;
+        report_.refusal = "torque_nm[" + std::to_string(j) + "] of sample " + std::to_string(command.seq) + " is " +
+                          format_number(torque) + ", beyond " + format_number(limit);
+        return true;
+      }
+    }
+    return false;
+  }
+
   /// Sets the end of the run if it is due.
   bool must_end() {
-    event_v1 event;
+    event_v2 event;
     if (stop_.load(std::memory_order_relaxed)) {
       end_ = PlantRunEnd::kStopped;
+    } else if (const Conflict conflict = link_.peers().take_conflict(); conflict != Conflict::kNone) {
+      end_ = end_by(conflict);
     } else if (link_.take(event) && event.code == static_cast<std::int32_t>(EventCode::kEnded) &&
                settings_.pace == Pace::kLockStep) {
       end_ = PlantRunEnd::kControllerEnded;
     } else if (monotonic_ns() - last_heard_ns_ > timeout_ns_) {
-      end_ = last_command_seq_ < 0 ? PlantRunEnd::kControllerNeverHeard : PlantRunEnd::kControllerSilent;
+      end_ = report_.refused_commands > 0 ? PlantRunEnd::kCommandsRefused
+             : last_command_seq_ < 0      ? PlantRunEnd::kControllerNeverHeard
+                                          : PlantRunEnd::kControllerSilent;
     }
     return end_.has_value();
+  }
+
+  static PlantRunEnd end_by(Conflict conflict) noexcept {
+    switch (conflict) {
+      case Conflict::kSecondPlant:
+        return PlantRunEnd::kSecondPlant;
+      case Conflict::kSecondController:
+        return PlantRunEnd::kSecondController;
+      default:
+        return PlantRunEnd::kRefused;
+    }
   }
 
   /// One sample of simulated time; false if the run ended instead.
   bool lock_step_sample() {
     send_measurement();
     const std::int64_t first_sent_ns = sent_ns_;
-    command_v1 command;
+    command_v2 command;
     while (true) {
       link_.receive(std::min(kLongestWaitNs, kRepeatPeriodNs));
       if (take_command(command) && command.seq == session_.seq()) {
@@ -153,11 +200,14 @@ class PlantRun {
 
   void run_real_time() {
     Pacer pacer(monotonic_ns(), period_ns_);
+    sent_ns_ = monotonic_ns();
     while (!end_ && !is_complete()) {
       const std::int64_t tick_ns = pacer.next(monotonic_ns());
       sleep_until(tick_ns);
       report_.wakeup.add(monotonic_ns() - tick_ns);
+      const std::int64_t last_sent_ns = sent_ns_;
       send_measurement();
+      stalled_ = sent_ns_ - last_sent_ns > period_ns_ + to_nanoseconds(settings_.hold_s);
       const SampleTorque sample = wait_for_command();
       if (!must_end()) {
         finish_sample(guard(sample), /*scenario_delay=*/false);
@@ -173,7 +223,7 @@ class PlantRun {
     const std::int64_t seq = session_.seq();
     const std::int64_t deadline_ns = sent_ns_ + period_ns_;
     SampleTorque sample{session_.torque(), kNoCommand};
-    command_v1 command;
+    command_v2 command;
     for (std::int64_t now_ns = monotonic_ns(); now_ns < deadline_ns; now_ns = monotonic_ns()) {
       link_.receive(std::min(deadline_ns - now_ns, kLongestWaitNs));
       if (!take_command(command)) {
@@ -195,13 +245,17 @@ class PlantRun {
   /// What acts on the sample if no command arrived.
   SampleTorque guard(const SampleTorque& sample) {
     report_.watchdog_at_end = false;
-    if (sample.delay_s != kNoCommand) {
+    if (stalled_) {
+      ++report_.stalls;
+      watchdog_.stalled();
+    } else if (sample.delay_s != kNoCommand) {
       watchdog_.command_at(to_nanoseconds(sample.delay_s));
       return sample;
     }
     if (!watchdog_.takes_over()) {
       return sample;
     }
+    link_.peers().release();
     ++report_.watchdog_samples;
     report_.watchdog_at_end = true;
     SampleTorque brake{{}, kNoCommand};
@@ -233,6 +287,8 @@ class PlantRun {
   std::int64_t last_heard_ns_;
   std::int64_t sent_ns_ = 0;
   std::int64_t last_command_seq_ = -1;
+  std::int64_t takeovers_ = 0;
+  bool stalled_ = false;
   std::optional<PlantRunEnd> end_;
   PlantRunReport report_;
 };
@@ -249,8 +305,16 @@ const char* to_string(PlantRunEnd end) noexcept {
       return "controller ended";
     case PlantRunEnd::kControllerSilent:
       return "controller silent";
+    case PlantRunEnd::kCommandsRefused:
+      return "commands refused";
     case PlantRunEnd::kControllerNeverHeard:
       return "controller never heard";
+    case PlantRunEnd::kSecondPlant:
+      return "second plant on this session";
+    case PlantRunEnd::kSecondController:
+      return "second controller on this session";
+    case PlantRunEnd::kRefused:
+      return "refused";
   }
   return "unknown";
 }

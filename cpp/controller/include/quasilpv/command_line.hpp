@@ -79,7 +79,8 @@ inline void declare(CLI::App& app, CommonOptions& options) {
 
 /// How this side signs its messages.
 inline WireIdentity identity_of(const CommonOptions& options, const Artifact& artifact) {
-  return {options.session, artifact.hash_prefix(), artifact.joints()};
+  return {options.session, artifact.hash_prefix(), artifact.joints(), options.pace,
+          to_nanoseconds(artifact.sample_period_s())};
 }
 
 /// Puts the link into authenticated mode if `--key` asks for it. INIT-ONLY. Throws InputError like MessageKey::load().
@@ -89,11 +90,58 @@ inline void apply_key(const CommonOptions& options, Link& link) {
   }
 }
 
+/// What a run on the same address looks like from here; empty if there is no sign of one.
+inline std::string other_run_hint(const Link& link, const std::string& url) {
+  const LinkCounters& counted = link.counters();
+  if (link.foreign_session()) {
+    return std::to_string(counted.wrong_session) + " messages of session " + std::to_string(*link.foreign_session()) +
+           " were heard on " + url + ": another run is there; give each a --url with a port of its own";
+  }
+  if (counted.wrong_artifact > 0) {
+    return std::to_string(counted.wrong_artifact) +
+           " messages of this session, but about another artifact, were heard on " + url +
+           ": give each run a session and a --url with a port of its own";
+  }
+  if (counted.wrong_length + counted.wrong_type > 0) {
+    return std::to_string(counted.wrong_length + counted.wrong_type) +
+           " messages of another type or version, or signed " + "by one side only, were heard on " + url;
+  }
+  return "";
+}
+
+/// Warns of another run on the same address, once a run is over.
+inline void warn_of_other_run(const std::string& program, const Link& link, const std::string& url) {
+  if (const std::string hint = other_run_hint(link, url); !hint.empty()) {
+    std::cerr << program << ": warning: " << hint << '\n';
+  }
+}
+
 /// Throws the TransportError of a run in which the other side was never heard.
-[[noreturn]] inline void throw_never_heard(const CommonOptions& options, const std::string& message,
+[[noreturn]] inline void throw_never_heard(const CommonOptions& options, const Link& link, const std::string& message,
                                            const std::string& other_side) {
+  const std::string hint = other_run_hint(link, options.url);
   throw TransportError("no " + message + " of session " + std::to_string(options.session) + " on " + options.url +
-                       " within " + std::to_string(options.timeout_s) + " s: is " + other_side + " running?");
+                       " within " + std::to_string(options.timeout_s) + " s: is " + other_side + " running?" +
+                       (hint.empty() ? "" : " (" + hint + ")"));
+}
+
+/// Throws the InputError of two sides that do not run in the same way.
+[[noreturn]] inline void throw_refused(const CommonOptions& options, const Link& link, const std::string& other_side) {
+  const auto name = [](Pace pace) { return std::string(pace == Pace::kLockStep ? "lockstep" : "realtime"); };
+  const Speaker& other = link.peers().opponent();
+  const std::string who = " of " + other_side + " (process " + std::to_string(process_of(other.sender)) + ")";
+  if (other.pace != options.pace) {
+    throw InputError("command line", "mode", name(options.pace), name(other.pace) + ", the mode" + who);
+  }
+  throw InputError(options.artifact, "sample_period_s", std::to_string(link.identity().period_ns) + " ns",
+                   std::to_string(other.period_ns) + " ns, the sample period" + who);
+}
+
+/// Who the second one is, if the reason for an end is that there is one.
+inline std::string naming(const std::string& reason, const Link& link) {
+  const bool second = reason.rfind("second ", 0) == 0;
+  const std::int64_t sender = link.peers().opponent().sender;
+  return second && sender != 0 ? reason + " (process " + std::to_string(process_of(sender)) + ")" : reason;
 }
 
 /// Says why a run counts as stopped by a fault. Returns its exit code.

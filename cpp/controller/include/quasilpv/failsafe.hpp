@@ -15,7 +15,7 @@ enum class ControllerState : std::int32_t {
   kFault = 4      ///< latched: the safe torque, until an explicit reset
 };
 
-/// Why a fault was latched (`event_v1::detail[0]` of EventCode::kFault).
+/// Why a fault was latched (`event_v2::detail[0]` of EventCode::kFault).
 enum class FaultCause : std::int32_t {
   kNone = 0,
   kMeasurementLost = 1,    ///< too many consecutive invalid or missing measurements
@@ -23,7 +23,10 @@ enum class FaultCause : std::int32_t {
   kDeadlineOverrun = 3,    ///< too many consecutive overruns
   kForeignMessages = 4,    ///< too many consecutive messages of another session or artifact
   kPremiseOutsideBox = 5,  ///< outside the operating domain for too long
-  kStopRequested = 6       ///< SIGINT or SIGTERM: a stop like a fault, but not an error
+  kStopRequested = 6,      ///< SIGINT or SIGTERM: a stop like a fault, but not an error
+  kSecondPlant = 7,        ///< two plants speak in this session
+  kSecondController = 8,   ///< two controllers speak in this session
+  kPlantFailed = 9         ///< the plant said that it cannot go on
 };
 
 const char* to_string(ControllerState state) noexcept;
@@ -48,6 +51,7 @@ struct FailsafeFlags {
   bool law_invalid = false;  ///< torque or model not finite: the law kept its last torque
   bool plant_silent = false;
   bool stop_requested = false;
+  FaultCause demanded = FaultCause::kNone;  ///< why the robot's side says that this run cannot go on
 };
 
 /// What the policy remembers from one sample to the next.

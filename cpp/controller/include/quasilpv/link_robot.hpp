@@ -16,17 +16,22 @@ class LinkRobot final : public Robot {
   bool read(RobotReading& reading, std::int64_t timeout_ns) noexcept override;
   void write(const RobotCommand& command) noexcept override;
   RobotRequest take_request() noexcept override;
+  FaultCause take_fault() noexcept override;
   std::int64_t take_longest_foreign_run() noexcept override { return link_.take_longest_wrong_run(); }
   void announce(ControllerNews news, std::int64_t seq, FaultCause cause) noexcept override;
 
  private:
+  void notice_conflict() noexcept;
+
   Link& link_;
+  FaultCause fault_ = FaultCause::kNone;
+  bool refused_ = false;
 };
 
 /// The reading in a message. RT-SAFE (bounded, no allocation, no lock, no throw), as the next.
-RobotReading to_reading(const measurement_v1& message) noexcept;
+RobotReading to_reading(const measurement_v2& message) noexcept;
 
 /// The message of a command; Link::send() fills in the rest.
-command_v1 to_message(const RobotCommand& command) noexcept;
+command_v2 to_message(const RobotCommand& command) noexcept;
 
 }  // namespace quasilpv

@@ -33,6 +33,7 @@ struct SampleConditions {
   std::int64_t consecutive_overruns = 0;  ///< samples before this one that took longer than their period
   std::int64_t consecutive_foreign = 0;   ///< Robot::take_longest_foreign_run()
   bool stop_requested = false;
+  FaultCause demanded = FaultCause::kNone;  ///< Robot::take_fault()
 };
 
 /// Turns the reading of sample k into the command of sample k:

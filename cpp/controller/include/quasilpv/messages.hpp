@@ -6,9 +6,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "quasilpv/command_v1.hpp"
-#include "quasilpv/event_v1.hpp"
-#include "quasilpv/measurement_v1.hpp"
+#include "quasilpv/command_v2.hpp"
+#include "quasilpv/event_v2.hpp"
+#include "quasilpv/measurement_v2.hpp"
+#include "quasilpv/pacer.hpp"
 #include "quasilpv/step.hpp"
 #include "quasilpv/telemetry_v1.hpp"
 
@@ -24,16 +25,16 @@ inline constexpr int kChannels = 4;
 const char* channel_name(Channel channel) noexcept;
 
 /// Channel a message type travels on.
-constexpr Channel channel_of(const measurement_v1& /*type*/) noexcept { return Channel::kMeasurement; }
-constexpr Channel channel_of(const command_v1& /*type*/) noexcept { return Channel::kCommand; }
+constexpr Channel channel_of(const measurement_v2& /*type*/) noexcept { return Channel::kMeasurement; }
+constexpr Channel channel_of(const command_v2& /*type*/) noexcept { return Channel::kCommand; }
 constexpr Channel channel_of(const telemetry_v1& /*type*/) noexcept { return Channel::kTelemetry; }
-constexpr Channel channel_of(const event_v1& /*type*/) noexcept { return Channel::kEvent; }
+constexpr Channel channel_of(const event_v2& /*type*/) noexcept { return Channel::kEvent; }
 
-/// Who sent an event (`event_v1::source`).
+/// Who sent an event (`event_v2::source`).
 enum class Side : std::int32_t { kController = 1, kPlant = 2, kOperator = 3 };
 inline constexpr std::size_t kSides = 3;
 
-/// What happened (`event_v1::code`).
+/// What happened (`event_v2::code`).
 enum class EventCode : std::int32_t {
   kStarted = 1,  ///< the sender entered its loop
   kEnded = 2,    ///< the run is over: from the plant after its last sample, from the controller when it stops
@@ -41,12 +42,25 @@ enum class EventCode : std::int32_t {
   kReset = 4     ///< asks the controller to leave a latched fault
 };
 
-/// Whose messages these are. A message of another session, artifact or number of joints is ignored and counted.
+/// Whose messages these are, and how this side runs, which every message states. A message of another session, artifact
+/// or number of joints is ignored and counted.
 struct WireIdentity {
   std::int64_t session = 0;        ///< chosen by who starts the run
   std::int64_t artifact_hash = 0;  ///< Artifact::hash_prefix()
   int joints = 0;
+  Pace pace = Pace::kLockStep;
+  std::int64_t period_ns = 0;  ///< sample period
 };
+
+/// No number of a message that counts time may lead to more than this, about 127 years: sums and products of such times
+/// stay within 64 bits.
+inline constexpr std::int64_t kLongestTimeNs = 4'000'000'000'000'000'000;
+
+/// A name that no other process has: random, with the process id in the low 22 bits; > 0. INIT-ONLY.
+std::int64_t new_sender();
+
+/// The process id in the name of a sender. RT-SAFE.
+constexpr std::int64_t process_of(std::int64_t sender) noexcept { return sender & 0x3FFFFF; }
 
 /// Outcome of decoding one packet.
 enum class DecodeStatus : std::uint8_t {
@@ -56,6 +70,7 @@ enum class DecodeStatus : std::uint8_t {
   kWrongType,
   kWrongSession,
   kWrongArtifact,
+  kOutOfBounds,  ///< a number or code that no side sends
   kNotAuthentic  ///< no tag, or that of another key; never from decode()
 };
 
@@ -71,8 +86,9 @@ template <class Message>
 void encode(const Message& message, Packet& packet) noexcept;
 
 /// Decodes a packet that must have the exact length of its type (LCM's own decoder accepts trailing bytes), the right
-/// checksum and fingerprint, and `identity`. `message` is written only if the result is kAccepted. RT-SAFE (bounded, no
-/// allocation, no lock, no throw).
+/// checksum and fingerprint, and `identity`. `message` is written if the result is kAccepted, and for messages of
+/// others (kWrongSession, kWrongArtifact), which say whose they are. RT-SAFE (bounded, no allocation, no lock, no
+/// throw).
 template <class Message>
 DecodeStatus decode(const void* bytes, std::size_t size, const WireIdentity& identity, Message& message) noexcept;
 

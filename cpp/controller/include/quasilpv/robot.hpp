@@ -27,8 +27,9 @@ struct RobotCommand {
 /// What the robot's side asks of the controller besides torques.
 enum class RobotRequest {
   kNone,
-  kEnd,        ///< the run is over
-  kResetFault  ///< leave a latched fault, if its cause is gone
+  kEnd,         ///< the run is over
+  kResetFault,  ///< leave a latched fault, if its cause is gone
+  kRefuse       ///< there can be no run: the two sides do not run in the same way
 };
 
 /// What the controller tells besides torques.
@@ -59,6 +60,10 @@ class Robot {
 
   /// The oldest request not taken yet. By default there is none.
   virtual RobotRequest take_request() noexcept { return RobotRequest::kNone; }
+
+  /// Why this run cannot go on, as far as only the robot's side can know; asked for once per reading, and once more at
+  /// the end of a run. By default nothing speaks against it.
+  virtual FaultCause take_fault() noexcept { return FaultCause::kNone; }
 
   /// Longest run of readings since the last call that were not meant for this controller. By default 0: a wire of its
   /// own carries nothing foreign.

@@ -21,6 +21,8 @@ class PlantRobot final : public Robot {
   void write(const RobotCommand& command) noexcept override;
   /// kEnd after the last sample, and after a failure.
   RobotRequest take_request() noexcept override;
+  /// kPlantFailed after a failure.
+  FaultCause take_fault() noexcept override { return failure_.empty() ? FaultCause::kNone : FaultCause::kPlantFailed; }
 
   /// Why the plant could not be integrated further; empty if it could.
   const std::string& failure() const noexcept { return failure_; }

@@ -1,6 +1,7 @@
 // The drive's watchdog: how long a torque acts that no command renews.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace quasilpv {
@@ -13,6 +14,10 @@ class Watchdog {
 
   /// A command acts from `delay_ns` after the start of this sample.
   void command_at(std::int64_t delay_ns) noexcept { silent_ns_ = period_ns_ - delay_ns; }
+
+  /// This process did not run for longer than the hold time: a torque of before is too old, whatever the plant's clock
+  /// says.
+  void stalled() noexcept { silent_ns_ = std::max(silent_ns_, hold_ns_); }
 
   /// A sample without a command.
   /// @return true if the silence outlasts the hold time before the sample ends: the watchdog takes the whole sample

@@ -22,6 +22,9 @@ FAULT_CAUSES = (
     "foreign messages",
     "premise outside its box",
     "stop requested",
+    "second plant on this session",
+    "second controller on this session",
+    "plant failed",
 )
 
 
@@ -31,7 +34,7 @@ def word(words: Sequence[str], code: int) -> str:
 
 
 def event_in_words(event: Any) -> str:
-    """Who says what in a record of `event_v1`, and why if it is about a fault."""
+    """Who says what in a record of an event, and why if it is about a fault."""
     said = f"{word(SOURCES, int(event['source']))} {word(EVENTS, int(event['code']))}"
     cause = int(event["detail"][0])
     return f"{said}: {word(FAULT_CAUSES, cause)}" if cause else said

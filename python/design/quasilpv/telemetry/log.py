@@ -26,7 +26,7 @@ from quasilpv.errors import InputError
 from quasilpv.files import write_atomically
 from quasilpv.scenarios import Scenario
 from quasilpv.telemetry.event_log import SUFFIX, Event, read_events
-from quasilpv.telemetry.message_types import CHANNELS, MessageType, Records, channel_type
+from quasilpv.telemetry.message_types import CHANNELS, MessageType, Records, logged_type
 from quasilpv.trajectories import Trajectory
 
 Mode: TypeAlias = Literal["in-process", "lockstep", "realtime"]
@@ -204,7 +204,10 @@ def read_log(path: Path | str) -> RunLog:
             foreign[event.channel] += 1
     if not documents and not any(packets.values()):
         raise InputError(str(path), "channels", ", ".join(foreign) or "none", f"at least one of {', '.join(CHANNELS)}")
-    channels = {channel: _decode(channel_type(channel), events) for channel, events in packets.items()}
+    channels = {
+        channel: _decode(logged_type(channel, [event.data for event in events]), events)
+        for channel, events in packets.items()
+    }
     return RunLog(str(path), documents, channels, dict(foreign), read.incomplete_bytes)
 
 

@@ -22,13 +22,13 @@ Records: TypeAlias = npt.NDArray[Any]
 """A structured array, one record per message, with the members of its type and ``fingerprint`` before them."""
 
 CHANNELS = {
-    "QLPV_MEASUREMENT": "measurement_v1",
-    "QLPV_COMMAND": "command_v1",
-    "QLPV_TELEMETRY": "telemetry_v1",
-    "QLPV_EVENT": "event_v1",
-    "QLPV_TRUTH": "truth_v1",
+    "QLPV_MEASUREMENT": ("measurement_v2", "measurement_v1"),
+    "QLPV_COMMAND": ("command_v2", "command_v1"),
+    "QLPV_TELEMETRY": ("telemetry_v1",),
+    "QLPV_EVENT": ("event_v2", "event_v1"),
+    "QLPV_TRUTH": ("truth_v1",),
 }
-"""Type of the messages on each channel."""
+"""Types of the messages on each channel: the one that is sent, and before it those that logs may hold."""
 
 CRC_BYTES = 8
 TAG_BYTES = 16
@@ -43,7 +43,7 @@ class MessageType:
     """A message type of fixed size.
 
     Attributes:
-        name: e.g. ``"command_v1"``.
+        name: e.g. ``"command_v2"``.
         fingerprint: what LCM puts before every message of the type, a signed 64-bit integer.
         record: layout of an encoded message, fingerprint included.
     """
@@ -92,8 +92,15 @@ def message_type(name: str) -> MessageType:
 
 
 def channel_type(channel: str) -> MessageType:
-    """The type of the messages on a channel of `CHANNELS`."""
-    return message_type(CHANNELS[channel])
+    """The type of the messages that are sent on a channel of `CHANNELS`."""
+    return message_type(CHANNELS[channel][0])
+
+
+def logged_type(channel: str, packets: Sequence[bytes]) -> MessageType:
+    """The type of the messages on a channel of a log: the newest that has nothing against one of its packets."""
+    types = [message_type(name) for name in CHANNELS[channel]]
+    readable = (kind for kind in types if any(kind.refusal(kind.content(packet)) is None for packet in packets))
+    return next(readable, types[0])
 
 
 def parse_definition(definition: str) -> MessageType:

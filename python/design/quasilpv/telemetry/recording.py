@@ -117,11 +117,19 @@ def messages(
     """
     records = channel_type(channel).new(seq.size)
     records["utime"] = np.rint(1e6 * seq * artifact.sample_period_s)
+    _introduce(records, artifact)
     records["seq"], records["session"], records["joints"] = seq, session, artifact.joints
     records["artifact_hash"] = hash_prefix(artifact.hash)
     for member, column in _MEMBERS[channel].items():
         records[member][:, : artifact.joints] = columns[column].reshape(seq.size, artifact.joints)
     return records
+
+
+def _introduce(records: Records, artifact: Artifact) -> None:
+    """Say how the sender runs, where messages say so: in lock-step, at the rate of its artifact; in one process nobody
+    has a name."""
+    if "period_ns" in (records.dtype.names or ()):
+        records["period_ns"] = round(1e9 * artifact.sample_period_s)
 
 
 def columns_of(channel: str, records: Records, joints: int) -> dict[str, FloatArray]:
@@ -154,6 +162,7 @@ def _run_event(artifact: Artifact, source: int, code: int, utime: int, seq: int)
     members = {"utime": utime, "seq": seq, "artifact_hash": hash_prefix(artifact.hash), "source": source, "code": code}
     for name, value in members.items():
         records[name] = value
+    _introduce(records, artifact)
     return Event(utime, "QLPV_EVENT", kind.encode(records)[0])
 
 
