@@ -9,13 +9,14 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import lcm
 import numpy as np
 import pytest
+import viser
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
@@ -257,6 +258,72 @@ def test_the_page_is_served_on_the_loopback_interface_only_and_follows_its_clock
     finally:
         page.close()
     assert page.url.startswith(f"http://{HOST}:")
+
+
+WEBSOCKET = {
+    "Connection": "Upgrade",
+    "Upgrade": "websocket",
+    "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+    "Sec-WebSocket-Protocol": f"viser-v{viser.__version__}",
+}
+OWN = ("127.0.0.1:{port}", "localhost:{port}", "LOCALHOST:{port}", "[::1]:{port}", "localhost", "localhost:9")
+FOREIGN_HOSTS = (
+    "evil.example",
+    "evil.example:{port}",
+    "127.0.0.1.evil.example:{port}",
+    "localhost.evil.example",
+    "127.0.0.1@evil.example",
+    "127.0.0.2:{port}",
+    "0.0.0.0:{port}",
+    "localhost:{port}:1",
+    "localhost:port",
+    "",
+)
+FOREIGN_ORIGINS = (
+    "null",
+    "",
+    "http://evil.example",
+    "https://127.0.0.1:{port}",
+    "http://127.0.0.1:1",
+    "http://127.0.0.1",
+    "http://localhost:{port}",
+    "http://127.0.0.1:{port}.evil.example",
+    "http://127.0.0.1:{port}/",
+    "file://",
+)
+
+
+@pytest.fixture(scope="module")
+def port(playback: Playback) -> Iterator[int]:
+    page = Page(playback, 0)
+    yield int(page.url.rpartition(":")[2])
+    page.close()
+
+
+def status(port: int, headers: Sequence[tuple[str, str]]) -> int:
+    """The status that the page answers a request with."""
+    lines = ["GET / HTTP/1.1", *(f"{name}: {value.format(port=port)}" for name, value in headers), "", ""]
+    with socket.create_connection((HOST, port), timeout=PATIENCE_S) as connection:
+        connection.sendall("\r\n".join(lines).encode())
+        return int(connection.recv(64).split()[1])
+
+
+@pytest.mark.parametrize("kind", [{}, WEBSOCKET], ids=["http", "websocket"])
+def test_when_another_page_asks_expect_it_refused(kind: dict[str, str], port: int) -> None:
+    own, rest = ("Host", OWN[0]), list(kind.items())
+    welcome = 101 if kind else 200
+    for host in OWN:
+        assert status(port, [("Host", host), *rest]) == welcome, host
+        assert status(port, [("Host", host), ("Origin", f"http://{host}"), *rest]) == welcome, host
+    for host in FOREIGN_HOSTS:
+        assert status(port, [("Host", host), *rest]) == 403, host
+        assert status(port, [("Host", host), ("Origin", f"http://{host}"), *rest]) == 403, host
+    for origin in FOREIGN_ORIGINS:
+        assert status(port, [own, ("Origin", origin), *rest]) == 403, origin
+    assert status(port, rest) == 403
+    assert status(port, [own, ("Host", "evil.example"), *rest]) == 403
+    assert status(port, [own, ("Origin", f"http://{OWN[0]}"), ("Origin", "http://evil.example"), *rest]) == 403
 
 
 def test_when_a_live_run_goes_on_expect_the_page_at_its_end_until_it_is_paused(

@@ -17,6 +17,7 @@ from quasilpv.view.curves import Curves, curves_of, step_histogram
 from quasilpv.view.live import LiveMotion
 from quasilpv.view.playback import SPEEDS, Instant, Playback, Player
 from quasilpv.view.robot_scene import RobotScene
+from quasilpv.view.same_origin import same_origin_only
 
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
@@ -198,7 +199,7 @@ class Page:
 
 
 def _serve(port: int) -> viser.ViserServer:
-    """A server on the loopback interface, on exactly this port, that says nothing by itself."""
+    """A server on the loopback interface, on exactly this port, for pages of this machine; it says nothing itself."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -206,7 +207,7 @@ def _serve(port: int) -> viser.ViserServer:
         except OSError as error:
             raise InputError("command line", "--port", port, f"a free port of {HOST}") from error
         free_port = int(probe.getsockname()[1])
-    with _quiet():
+    with _quiet(), same_origin_only():
         return viser.ViserServer(host=HOST, port=free_port, verbose=False)
 
 
