@@ -13,6 +13,7 @@ from quasilpv.conditions.registry import condition
 from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.lmi.feasibility import decide
 from quasilpv.polytopes import polytopic_model
+from quasilpv.polytopes.scaling import ladder
 from quasilpv.polytopes.units import Units
 from quasilpv.studies import Answer, Sweep, Verdict
 from quasilpv.studies.examination import stated
@@ -242,3 +243,17 @@ def triangle(sizes: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
             columns += [start + j] * (j + 1)
         start += size
     return np.array(rows), np.array(columns)
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-160, 1e160, 1e300])
+def test_numbers_that_would_leave_the_range_of_doubles_stay_as_they_are(size: float) -> None:
+    """The verdict may be unknown, but no number is lost on the way to it."""
+    x, u = sp.symbols("x u", real=True)
+    plant = DescriptorSystem.from_equations(
+        [ql.rate(x) - size * x - u], name="extreme", state=(x,), inputs=(u,), domain={x: (-1.0, 1.0)}
+    )
+    for units in ladder(plant):
+        if units is not None:
+            assert (units.of(plant).A.constant / units.D[:, None] / units.T == plant.A.constant).all()
+    answer = ql.solve(plant, "I.2")
+    assert answer.verdict is not Verdict.INFEASIBLE

@@ -256,6 +256,8 @@ def test_an_answer_is_short_and_says_how_sure() -> None:
         answer = answered(Question("ex-I.1", "I.2", parameters=(("b", b),)))
         assert len(repr(answer).splitlines()) <= 10
         assert repr(answer).startswith(answer.headline)
+    for name in ("ex-I.1", "arm3", "ex-III.12"):
+        assert len(repr(system(name)).splitlines()) <= 10
 
 
 def test_an_answer_survives_its_document() -> None:

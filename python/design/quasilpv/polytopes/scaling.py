@@ -53,29 +53,37 @@ def ladder(system: DescriptorSystem) -> Iterator[Units | None]:
     First the robust fit that also knows the half-widths w of the domain (``t_j - t_k = log(w_j / w_k)``), then the
     robust fit alone, then plain least squares; then the same three with states and inputs in the sizes they have in the
     closed loop of a linear quadratic regulator at the centre of the box, the square roots of the diagonal of its
-    Gramian.
+    Gramian. Units in which numbers would leave the range of doubles are left out; where all would, the units it comes
+    in are all there is.
     """
-    fit = _Fit.of(system)
+    fit, widths = _Fit.of(system), _widths(system)
     seen: list[NDArray[np.int_]] = []
-    for exponents in _steps(system, fit):
-        step = fit.multiples(exponents)
-        if all(np.abs(step - other).max(initial=0) > NEAR for other in seen):
-            seen.append(step)
-            yield None if np.abs(step).max(initial=0) <= NEAR else fit.units(system, exponents)
 
+    def is_new(exponents: FloatArray) -> bool:
+        """Whether these units can be used and are not near others; remembers them."""
+        multiples = fit.multiples(exponents)
+        near = any(np.abs(multiples - other).max(initial=0) <= NEAR for other in seen)
+        if near or not fit.units(system, exponents).are_exact_for(system):
+            return False
+        seen.append(multiples)
+        return True
 
-def _steps(system: DescriptorSystem, fit: _Fit) -> Iterator[FloatArray]:
-    widths = _widths(system)
+    def units(exponents: FloatArray) -> Units | None:
+        same = np.abs(fit.multiples(exponents)).max(initial=0) <= NEAR
+        return None if same else fit.units(system, exponents)
+
     fits = []
-    for known, robust in ((widths, True), ({}, True), ({}, False)):
-        if robust and known is widths and len(widths) < 2:
-            continue
-        fits.append(fit.solved(known, robust=robust))
-        yield fits[-1]
+    for known, robust in ((widths, True), ({}, True), ({}, False))[len(widths) < 2 :]:
+        exponents = fit.solved(known, robust=robust)
+        if is_new(exponents):
+            fits.append(exponents)
+            yield units(exponents)
+    if not fits:
+        yield None
     for one in fits:
         refined = _refined(system, fit, one)
-        if refined is not None:
-            yield refined
+        if refined is not None and is_new(refined):
+            yield units(refined)
 
 
 class _Fit(NamedTuple):

@@ -4,9 +4,10 @@ With ``x = T x^``, ``u = S u^``, ``y = Y y^``, ``t = c t^`` and the equations mu
 
     E^ = D E T / c,    A^ = D A T,    B^ = D B S,    C^ = Y^-1 C T,
 
-T, S, Y, D diagonal. All factors are powers of two: the numbers of the new system are exact, and so is the way back. The
-premises keep their values, and their bounds. What a condition proves of the new system is true of the old one with
-``P = T P^ T``, ``K = S K^ T^-1``, ``alpha = alpha^ / c`` and times multiplied by c: the two are one system.
+T, S, Y, D diagonal. All factors are powers of two: the numbers of the new system are exact, unless they leave the range
+of doubles (`Units.are_exact_for`), and so is the way back. The premises keep their values, and their bounds. What a
+condition proves of the new system is true of the old one with ``P = T P^ T``, ``K = S K^ T^-1``, ``alpha = alpha^ / c``
+and times multiplied by c: the two are one system.
 """
 
 from __future__ import annotations
@@ -23,6 +24,12 @@ from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.premise import AffineMatrix, PremiseKind
 
 FloatArray = NDArray[np.float64]
+
+LARGEST_EXPONENT = 200
+"""Of a power of two; three of them are multiplied."""
+
+SMALLEST = 2.0**-400
+"""Numbers between it and its inverse stay normal doubles, products with three powers of two included."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +85,17 @@ class Units:
         """Old units of time in a new one."""
         return float(2.0**self.time)
 
+    def are_exact_for(self, system: DescriptorSystem) -> bool:
+        """Whether no number of the system leaves the range of normal doubles in these units, nor on the way back."""
+        exponents = (*self.state, *self.inputs, *self.outputs, *self.rows, self.time)
+        if max(map(abs, exponents), default=0) > LARGEST_EXPONENT:
+            return False
+        numbers = np.concatenate(
+            [part.ravel() for matrix in (system.E, system.A, system.B, system.C) for part in _parts(matrix)]
+        )
+        sizes = np.abs(numbers[numbers != 0.0])
+        return bool(np.all((sizes > SMALLEST) & (sizes < 1.0 / SMALLEST)))
+
     def of(self, system: DescriptorSystem) -> DescriptorSystem:
         """The system in these units.
 
@@ -106,6 +124,10 @@ class Units:
                 for symbol, (low, high) in system.domain.items()
             }
         return replace(system, **changed)
+
+
+def _parts(matrix: AffineMatrix) -> tuple[FloatArray, FloatArray]:
+    return matrix.constant, matrix.coefficients
 
 
 def _powers(exponents: Sequence[int]) -> FloatArray:

@@ -18,6 +18,9 @@ from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
 from quasilpv.systems.premise_search import find_premises
 from quasilpv.systems.uncertainty import NormBoundedUncertainty
 
+SHOWN_PREMISES = 6
+"""In the short description of a system."""
+
 
 class SystemMatrices(NamedTuple):
     """The four matrices at one premise vector."""
@@ -28,7 +31,7 @@ class SystemMatrices(NamedTuple):
     C: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DescriptorSystem:
     """``E(z) x' = A(z) x + B(z) u``, ``y = C(z) x``, every matrix affine in the premises z(x), z in a guaranteed box.
 
@@ -155,6 +158,18 @@ class DescriptorSystem:
             domain=domain,
             unknown=unknown,
         )
+
+    def __repr__(self) -> str:
+        """In a few lines: name, sizes, premises."""
+        names = ", ".join(symbol.name for symbol in self.state)
+        algebraic = self.order - self.differential
+        kinds = f"{self.differential} differential, {algebraic} algebraic" if algebraic else f"{self.order}"
+        first = self.premises[:SHOWN_PREMISES]
+        shown = [f"  {p.name} in [{p.lower:.4g}, {p.upper:.4g}], {p.kind.value}" for p in first]
+        if len(self.premises) > SHOWN_PREMISES:
+            shown.append(f"  and {len(self.premises) - SHOWN_PREMISES} more premises")
+        inputs = ", ".join(self.inputs) or "none"
+        return "\n".join([f"{self.name}: {kinds} states {names}; inputs {inputs}", *shown])
 
     @property
     def order(self) -> int:
