@@ -117,7 +117,8 @@ def test_the_answer_names_the_mode_and_the_states() -> None:
 
 
 def test_every_condition_is_known_to_imply_something_or_not() -> None:
-    assert set(IMPLIED) | {"estimated-observer"} == set(CONDITIONS)
+    own = {name for name, known in CONDITIONS.items() if known.build.__module__.startswith("quasilpv.")}
+    assert set(IMPLIED) | {"estimated-observer"} == own
 
 
 @pytest.mark.parametrize("case", [case for case in CASES if case[2] != "arm3"], ids=lambda c: " ".join(map(str, c[:3])))
