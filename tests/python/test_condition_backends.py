@@ -68,7 +68,7 @@ class Case:
         spread = factor * float(rng.uniform(0.05, 0.9))
         system = random_system(self.seed, spread=spread, constant_input=bool(rng.integers(2)), **kind)
         entry = condition(self.name)
-        return entry.build(polytopic_model(system, entry.representation), Options()).problem
+        return entry.inequalities(polytopic_model(system, entry.representation), Options()).problem
 
 
 def directly(decision: Decision) -> Verdict:

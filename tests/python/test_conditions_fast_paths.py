@@ -110,7 +110,7 @@ def test_a_double_sum_with_constant_input_is_a_single_one(slack: Slack) -> None:
 
 def _decide(name: str, model: PolytopicModel, options: Options, form: Form) -> bool:
     """The verdict of a form; a feasible one is judged by its law."""
-    statement = condition(name).build(model, replace(options, form=form))
+    statement = condition(name).inequalities(model, replace(options, form=form))
     decision = decided(statement.problem)
     assert decision.outcome in DECIDED
     if decision.feasible:

@@ -102,7 +102,7 @@ def test_when_the_builder_errs_in_the_class_expect_an_error_that_does_not_decay_
     model, options = arm2(), replace(OPTIONS, decay_rate=0.5, sample_period_s=period_s)
     steps = []
     for builder in (estimated_observer, mutant.loaded(monkeypatch, estimated_observer.__name__)):
-        statement = builder.build(model, options)
+        statement = builder.CONDITION.build(model, options)
         decision = decide(CompiledProblem.of(statement.problem))
         assert decision.feasible
         steps.append(worst_step(model, statement.feedback(decision.values), options))

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from quasilpv.conditions.blocks import double_sum, single_sum
 from quasilpv.conditions.gains import DelayedFeedback, DescriptorGain, Gain, ObserverGain, PolytopicGain
+from quasilpv.conditions.reliance import Reliance, Relied, refuse_refuted, reliances
 from quasilpv.conditions.slack import Slack
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable
@@ -129,29 +130,29 @@ class Condition:
         summary: one line for a listing.
         reference: author, year, theorem.
         representation: with which it was published.
-        build: states it for a model.
+        inequalities: writes them for a model that has what the condition relies on; ask `build`.
+        relies_on: what a solution of them is worth nothing without, see `quasilpv.conditions.reliance`.
     """
 
     id: str
     summary: str
     reference: str
     representation: str
-    build: Callable[[PolytopicModel, Options], Statement]
+    inequalities: Callable[[PolytopicModel, Options], Statement]
+    relies_on: tuple[Reliance, ...]
 
+    def build(self, model: PolytopicModel, options: Options) -> Statement:
+        """State it for a model.
 
-def require_regular(model: PolytopicModel, condition: str) -> None:
-    """Refuse a system with algebraic states.
+        Raises:
+            InputError: something the condition relies on is refuted (named), or the condition does not apply.
+        """
+        refuse_refuted(self.id, self.relies_on, model)
+        return self.inequalities(model, options)
 
-    Args:
-        model: the system.
-        condition: id of the condition that cannot take one.
-
-    Raises:
-        InputError: there are algebraic states.
-    """
-    if model.differential != model.order:
-        got = f"{model.order - model.differential} algebraic states"
-        raise InputError(f"condition {condition}", model.system.name, got, "a regular system (E(z) invertible)")
+    def relied(self, model: PolytopicModel) -> tuple[Relied, ...]:
+        """What of the things it relies on is proved, refuted or assumed for a model: (name, status, detail) each."""
+        return reliances(self.relies_on, model)
 
 
 def shared_gains(model: PolytopicModel, columns: int, name: str = "F") -> tuple[Variable, ...]:

@@ -30,7 +30,6 @@ from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.expressions import as_expression
 from quasilpv.polytopes import PolytopicModel
-from quasilpv.polytopes.model import unknown_premises
 
 
 class MovingLyapunov:
@@ -66,18 +65,16 @@ class MovingLyapunov:
         return as_expression(self.D[i] * Fraction(1, 2))
 
 
-def require_delayed(model: PolytopicModel, options: Options, condition: str) -> None:
-    """Refuse what a law with memory cannot take.
+def require_no_decay_rate(options: Options, condition: str) -> None:
+    """Refuse a decay rate, which the theorems with memory do not have.
 
     Args:
-        model, options: of a statement.
+        options: of a statement.
         condition: its id.
 
     Raises:
-        InputError: unknown premises, whose weights the law would need, or a decay rate.
+        InputError: there is one.
     """
-    if unknown_premises(model.system):
-        raise InputError(f"condition {condition}", model.system.name, "unknown premises", "a system without")
     if options.decay_rate:
         raise InputError(f"condition {condition}", "decay rate", options.decay_rate, "0, the theorem has none")
 

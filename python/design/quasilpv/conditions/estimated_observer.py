@@ -38,17 +38,16 @@ from quasilpv.conditions.condition import (
     Options,
     Statement,
     Values,
-    require_regular,
     vertex_sum,
 )
 from quasilpv.conditions.gains import ObserverGain
 from quasilpv.conditions.mismatch import Form, Mismatch, bounded_jacobian
+from quasilpv.conditions.reliance import Reliance
 from quasilpv.conditions.sampled_observer import MULTIPLIER_SAMPLES
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable, block, he, to_rational
 from quasilpv.lmi.exact import Matrix
 from quasilpv.polytopes import PolytopicModel
-from quasilpv.polytopes.model import unknown_premises
 from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.intervals import enclose
 from quasilpv.systems.premise import AffineMatrix, PremiseKind
@@ -57,12 +56,11 @@ _ID = "estimated-observer"
 _TOLERANCE = 1e-4
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State the condition with the bounded Jacobian of the estimated part, proved over the system's domain.
 
     Raises:
-        InputError: the system has algebraic states, unknown premises, an output matrix that depends on premises, or
-            estimated premises in E or B.
+        InputError: an output matrix that depends on premises, no estimated premises, or some in E or B.
     """
     _require_supported(model)
     own = measured_part(model)
@@ -168,11 +166,8 @@ def _weighted(taus: list[Variable], matrices: list[Matrix]) -> Expression:
 
 
 def _require_supported(model: PolytopicModel) -> None:
-    require_regular(model, _ID)
     system = model.system
     refuse = partial(InputError, f"condition {_ID}", system.name)
-    if unknown_premises(system):
-        raise refuse("unknown premises", "a system without")
     if system.C.coefficients.any():
         raise refuse("C with premises", "a constant C")
     estimated = [k for k, premise in enumerate(system.premises) if premise.kind is PremiseKind.ESTIMATED]
@@ -187,5 +182,14 @@ CONDITION = Condition(
     summary="regular systems with estimated premises: observer for Euler's sampled model",
     reference="this project, after Dehak 2022, III.4",
     representation="per-premise",
-    build=build,
+    inequalities=inequalities,
+    relies_on=(
+        Reliance.REGULAR,
+        Reliance.NO_UNKNOWN,
+        Reliance.INDEX_ONE,
+        Reliance.OUTPUTS,
+        Reliance.SCHEDULED,
+        Reliance.EULER,
+        Reliance.DOMAIN,
+    ),
 )

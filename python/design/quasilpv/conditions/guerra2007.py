@@ -16,27 +16,25 @@ from fractions import Fraction
 import numpy as np
 
 from quasilpv.conditions.blocks import double_sum
-from quasilpv.conditions.condition import Condition, Feedback, Options, Statement, Values, require_regular
+from quasilpv.conditions.condition import Condition, Feedback, Options, Statement, Values
 from quasilpv.conditions.gains import TwoSetsGain
+from quasilpv.conditions.reliance import Reliance
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable, block
 from quasilpv.polytopes import PolytopicModel
-from quasilpv.polytopes.model import ExactMatrix, Vertices, unknown_premises
+from quasilpv.polytopes.model import ExactMatrix, Vertices
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State the theorem.
 
     Unknowns ``P_1 = P_1' > 0`` (n, n), P3_ij, P4_ij (n, n) and F_jk (m, n).
 
     Raises:
-        InputError: the system has algebraic states or unknown premises, or the representation is not one box.
+        InputError: the representation is not one box.
     """
-    require_regular(model, "guerra-2007")
     if len(model.polytope.blocks) != 1 or model.polytope.blocks[0].kind != "box":
         raise InputError("condition guerra-2007", "representation", "several blocks or a simplex", "ts")
-    if unknown_premises(model.system):
-        raise InputError("condition guerra-2007", model.system.name, "unknown premises", "a system without")
     n, m = model.order, model.inputs
     AB, E = _distinct(model.vertices(lambda E, A, B: np.hstack([A, B]))), _distinct(model.E)
     P1 = Variable("P1", n, symmetric=True)
@@ -78,5 +76,13 @@ CONDITION = Condition(
     summary="regular systems: two sets of rules, Lyapunov matrix with free lower blocks",
     reference="Guerra, Bernal, Kruszewski and Afroun 2007, Theorem 1; counts of Dehak 2022, Table II.4",
     representation="ts",
-    build=build,
+    inequalities=inequalities,
+    relies_on=(
+        Reliance.REGULAR,
+        Reliance.NO_UNKNOWN,
+        Reliance.INDEX_ONE,
+        Reliance.STATE,
+        Reliance.SCHEDULED,
+        Reliance.DOMAIN,
+    ),
 )

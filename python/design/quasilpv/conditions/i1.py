@@ -18,12 +18,13 @@ from quasilpv.conditions.blocks import single_sum
 from quasilpv.conditions.condition import Condition, Feedback, Form, Options, Statement, Values, single_sum_blocks
 from quasilpv.conditions.cube import cube_sum, is_cube
 from quasilpv.conditions.extended import extended_lyapunov, extended_state, extended_states
+from quasilpv.conditions.reliance import Reliance
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.exact import rank_factors
 from quasilpv.polytopes import PolytopicModel
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State Theorem I.1.
 
     Unknowns ``P_11 = P_11' > 0`` (q, q), P_21 (n, q) and P_22 (n, n).
@@ -57,5 +58,10 @@ CONDITION = Condition(
     summary="admissibility of an unforced system, quadratic Lyapunov function",
     reference="Dehak 2022, Theorem I.1",
     representation="ts",
-    build=build,
+    inequalities=inequalities,
+    relies_on=(
+        Reliance.INDEX_ONE,
+        Reliance.ASSUMPTION_1,
+        Reliance.DOMAIN,
+    ),
 )

@@ -41,6 +41,7 @@ from quasilpv.conditions.extended import (
     on_differential,
 )
 from quasilpv.conditions.gains import PolytopicGain, on_state
+from quasilpv.conditions.reliance import COMPENSATION
 from quasilpv.conditions.slack import Slack
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.expressions import as_expression
@@ -60,7 +61,7 @@ class _Lyapunov:
         return self.matrix.at(values).astype(float)
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State Theorem I.2.
 
     Unknowns ``P_11 = P_11' > 0`` (q, q), P_21 (n, q), P_22 (n, n) and M_j (m, q) per vertex.
@@ -139,5 +140,6 @@ CONDITION = Condition(
     summary="parallel distributed compensation F(z) x_d, quadratic Lyapunov function",
     reference="Dehak 2022, Theorem I.2, with the constant of the double sum corrected",
     representation="ts",
-    build=build,
+    inequalities=inequalities,
+    relies_on=COMPENSATION,
 )

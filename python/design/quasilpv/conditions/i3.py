@@ -24,12 +24,13 @@ from quasilpv.conditions.extended import (
     on_differential,
 )
 from quasilpv.conditions.gains import PolytopicGain, on_state
+from quasilpv.conditions.reliance import COMPENSATION
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable, block, he, identity, to_rational, zeros
 from quasilpv.polytopes import PolytopicModel
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State Theorem I.3 on the known premises of a system.
 
     Unknowns ``P_11 = P_11' > 0`` (q, q), P_21 (n, q), P_22 (n, n), ``e_a, e_b > 0``, and M_j (m, q) per vertex.
@@ -77,5 +78,6 @@ CONDITION = Condition(
     summary="robust compensation F(z) x_d, unknown premises as norm-bounded uncertainty",
     reference="Dehak 2022, Theorem I.3, corrected",
     representation="ts",
-    build=build,
+    inequalities=inequalities,
+    relies_on=COMPENSATION,
 )

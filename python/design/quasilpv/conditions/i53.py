@@ -27,13 +27,14 @@ from quasilpv.conditions.condition import (
 from quasilpv.conditions.elimination import completed, gains_are_free, gains_on_extended, unactuated_rows
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, extended_states_in_double
 from quasilpv.conditions.gains import PolytopicGain
+from quasilpv.conditions.reliance import Reliance
 from quasilpv.conditions.slack import Slack
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.expressions import as_expression
 from quasilpv.polytopes import PolytopicModel
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State the condition.
 
     Unknowns ``P_11 = P_11' > 0`` (q, q), P_21 (n, q), P_22 (n, n) and M_j (m, N) per vertex.
@@ -80,5 +81,13 @@ CONDITION = Condition(
     summary="extended compensation K(z) (x_d, x_d', x_a), needs derivatives of the states",
     reference="Dehak 2022, (I.53) with Theorem I.2",
     representation="reduced",
-    build=build,
+    inequalities=inequalities,
+    relies_on=(
+        Reliance.CLOSED_INDEX_ONE,
+        Reliance.ASSUMPTION_1,
+        Reliance.STATE,
+        Reliance.DERIVATIVES,
+        Reliance.SCHEDULED,
+        Reliance.DOMAIN,
+    ),
 )

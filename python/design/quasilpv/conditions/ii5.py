@@ -44,6 +44,7 @@ from quasilpv.conditions.cube import cube_with_gains, is_cube
 from quasilpv.conditions.elimination import gains_are_free
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, on_differential
 from quasilpv.conditions.gains import PolytopicGain, on_state
+from quasilpv.conditions.reliance import COMPENSATION
 from quasilpv.conditions.slack import Slack
 from quasilpv.lmi import Expression, Problem, Variable, block, zeros
 from quasilpv.polytopes import PolytopicModel
@@ -52,7 +53,7 @@ LyapunovMatrix = Callable[[int, int], Expression]
 """From vertex indices to P_ij."""
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State Theorem II.5.
 
     Unknowns ``V = V' > 0`` (q, q), W_ij (n, q), Z_ij (n, n), and per vertex L_j, R_j (N, N) and F_j (m, q).
@@ -66,9 +67,9 @@ def build(model: PolytopicModel, options: Options) -> Statement:
     return with_multipliers(model, options, problem, V.expression, _free_lyapunov(model, options, V))
 
 
-def build_without_slack(model: PolytopicModel, options: Options) -> Statement:
+def without_slack(model: PolytopicModel, options: Options) -> Statement:
     """State Corollary 1: Theorem II.5 without slack, whatever the options say."""
-    return build(model, replace(options, slack=Slack.NONE))
+    return inequalities(model, replace(options, slack=Slack.NONE))
 
 
 def with_multipliers(
@@ -149,7 +150,8 @@ CONDITION = Condition(
     summary="singular systems: F(z) x_d, multipliers and slack",
     reference="Dehak 2022, Theorem II.5",
     representation="per-premise@0",
-    build=build,
+    inequalities=inequalities,
+    relies_on=COMPENSATION,
 )
 
 COROLLARY = Condition(
@@ -157,5 +159,6 @@ COROLLARY = Condition(
     summary="II.5 without slack",
     reference="Dehak 2022, Corollary 1 of Theorem II.5",
     representation="per-premise@0",
-    build=build_without_slack,
+    inequalities=without_slack,
+    relies_on=COMPENSATION,
 )

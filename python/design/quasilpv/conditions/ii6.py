@@ -24,21 +24,17 @@ from quasilpv.conditions.condition import (
     Statement,
     descriptor_statement,
     is_single_sum,
-    require_regular,
 )
+from quasilpv.conditions.reliance import DESCRIPTOR_LAW
 from quasilpv.lmi import Expression, Variable, block
 from quasilpv.polytopes import PolytopicModel
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State Theorem II.6 for a regular system.
 
     Unknowns ``P = P' > 0`` (n, n), and per vertex L_j, R_j (n, n) and F_j (m, n).
-
-    Raises:
-        InputError: the system has algebraic states.
     """
-    require_regular(model, "II.6")
     if options.form is Form.REDUCED and matched.applies(model):
         return matched.build(model, options)
     n, count = model.order, model.vertex_count
@@ -62,5 +58,6 @@ CONDITION = Condition(
     summary="regular systems: descriptor law F(z) E(z)^-T P^-1 x, no extended state",
     reference="Dehak 2022, Theorem II.6, with the slack sums corrected",
     representation="per-premise@0",
-    build=build,
+    inequalities=inequalities,
+    relies_on=DESCRIPTOR_LAW,
 )

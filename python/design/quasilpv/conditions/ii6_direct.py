@@ -20,22 +20,18 @@ from quasilpv.conditions.condition import (
     Options,
     Statement,
     descriptor_statement,
-    require_regular,
 )
+from quasilpv.conditions.reliance import DESCRIPTOR_LAW
 from quasilpv.lmi import Expression, Variable
 from quasilpv.lmi.expressions import as_expression
 from quasilpv.polytopes import PolytopicModel
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State the condition for a regular system.
 
     Unknowns ``P = P' > 0`` (n, n) and F_j (m, n) per vertex.
-
-    Raises:
-        InputError: the system has algebraic states.
     """
-    require_regular(model, "II.6-direct")
     if options.form is Form.REDUCED and matched.applies(model):
         return matched.build(model, options)
     alpha = Fraction(options.decay_rate)
@@ -55,5 +51,6 @@ CONDITION = Condition(
     summary="II.6 without multipliers: smaller, slightly more conservative",
     reference="this project, after Dehak 2022, Theorem II.6",
     representation="per-premise@0",
-    build=build,
+    inequalities=inequalities,
+    relies_on=DESCRIPTOR_LAW,
 )

@@ -16,22 +16,23 @@ from itertools import product
 
 from quasilpv.conditions.blocks import double_sum
 from quasilpv.conditions.condition import Condition, Feedback, Options, Statement, Values
-from quasilpv.conditions.delayed import MovingLyapunov, delayed_feedback, require_delayed
+from quasilpv.conditions.delayed import MovingLyapunov, delayed_feedback, require_no_decay_rate
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, on_differential
+from quasilpv.conditions.reliance import Reliance
 from quasilpv.lmi import Expression, Problem, Variable, block, zeros
 from quasilpv.polytopes import PolytopicModel
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State Theorem II.7.
 
     Unknowns ``V = V' > 0`` and D_k symmetric (q, q), W_k (n, q), Z_k (n, n), L_jkm, R_jkm (N, N) and F_jkm (m, q); no k
     but that of D_k in the limit.
 
     Raises:
-        InputError: unknown premises, or a decay rate.
+        InputError: a decay rate.
     """
-    require_delayed(model, options, "II.7")
+    require_no_decay_rate(options, "II.7")
     q, n, count = model.differential, model.order, model.vertex_count
     problem = Problem()
     V = MovingLyapunov(problem, "V", q, count, options.window_s)
@@ -62,5 +63,13 @@ CONDITION = Condition(
     summary="singular systems: Lyapunov function with memory, no bound on the speed of the premises",
     reference="Dehak 2022, Theorem II.7, without (II.50a) and with P_k = P + tau D_k",
     representation="per-premise@0",
-    build=build,
+    inequalities=inequalities,
+    relies_on=(
+        Reliance.INDEX_ONE,
+        Reliance.ASSUMPTION_1,
+        Reliance.NO_UNKNOWN,
+        Reliance.STATE,
+        Reliance.SCHEDULED,
+        Reliance.DOMAIN,
+    ),
 )

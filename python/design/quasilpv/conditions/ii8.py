@@ -20,23 +20,22 @@ from quasilpv.conditions.condition import (
     Options,
     Statement,
     Values,
-    require_regular,
 )
-from quasilpv.conditions.delayed import MovingLyapunov, delayed_feedback, require_delayed
+from quasilpv.conditions.delayed import MovingLyapunov, delayed_feedback, require_no_decay_rate
+from quasilpv.conditions.reliance import Reliance
 from quasilpv.lmi import Expression, Problem, Variable, block, zeros
 from quasilpv.polytopes import PolytopicModel
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State Theorem II.8 for a regular system.
 
     Unknowns ``P = P' > 0`` and D_k symmetric (n, n), L_jkm, R_jkm (n, n) and F_jkm (m, n); no k in the limit.
 
     Raises:
-        InputError: algebraic states, unknown premises, or a decay rate.
+        InputError: a decay rate.
     """
-    require_regular(model, "II.8")
-    require_delayed(model, options, "II.8")
+    require_no_decay_rate(options, "II.8")
     n, count = model.order, model.vertex_count
     problem = Problem()
     P = MovingLyapunov(problem, "P", n, count, options.window_s)
@@ -72,5 +71,13 @@ CONDITION = Condition(
     summary="regular systems: Lyapunov function with memory, no bound on the speed of the premises",
     reference="Dehak 2022, Theorem II.8, with five slacks averaged and P_k = P + tau D_k",
     representation="per-premise@0",
-    build=build,
+    inequalities=inequalities,
+    relies_on=(
+        Reliance.REGULAR,
+        Reliance.NO_UNKNOWN,
+        Reliance.INVERTIBLE_E,
+        Reliance.STATE,
+        Reliance.SCHEDULED,
+        Reliance.DOMAIN,
+    ),
 )

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations_with_replacement, permutations, product
 
-from quasilpv.conditions.condition import require_regular
 from quasilpv.conditions.delayed import MovingLyapunov
+from quasilpv.conditions.reliance import Reliance, refuse_refuted
 from quasilpv.lmi import Expression, Problem, Variable, zeros
 from quasilpv.lmi.expressions import as_expression
 from quasilpv.polytopes import PolytopicModel
@@ -43,14 +43,14 @@ def delayed_design(model: PolytopicModel, decay_rate: float, window_s: float) ->
     """State the inequalities.
 
     Args:
-        model: a regular system without unknown premises.
+        model: the system.
         decay_rate: alpha, 1/s.
         window_s: tau.
 
     Raises:
-        InputError: the system has algebraic states.
+        InputError: algebraic states, unknown premises, or an E(z) that is not proved invertible.
     """
-    require_regular(model, "II.8-direct")
+    refuse_refuted("II.8-direct", (Reliance.REGULAR, Reliance.NO_UNKNOWN, Reliance.INVERTIBLE_E), model)
     n, count = model.order, model.vertex_count
     problem = Problem()
     P = MovingLyapunov(problem, "P", n, count, window_s)

@@ -18,12 +18,13 @@ from fractions import Fraction
 from quasilpv.conditions.condition import Condition, Form, Options, Statement
 from quasilpv.conditions.extended import extended_lyapunov
 from quasilpv.conditions.ii5 import with_multipliers
+from quasilpv.conditions.reliance import COMPENSATION
 from quasilpv.conditions.slack import Slack
 from quasilpv.lmi import Expression, Problem, Variable, zeros
 from quasilpv.polytopes import PolytopicModel
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State Theorem III.9.
 
     Unknowns per block V_b symmetric (q, q), W_b (n, q) and Z_b (n, n), and per vertex L_j, R_j (N, N) and F_j (m, q).
@@ -52,5 +53,6 @@ CONDITION = Condition(
     summary="uncertain singular systems: F(z) x_d, unknown premises as blocks of their own",
     reference="Dehak 2022, Theorem III.9",
     representation="uncertain@0",
-    build=build,
+    inequalities=inequalities,
+    relies_on=COMPENSATION,
 )

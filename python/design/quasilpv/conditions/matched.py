@@ -72,10 +72,11 @@ def _gains(model: PolytopicModel, P: FloatArray, decay_rate: float) -> FloatArra
     A = A + decay_rate * E
     top, below = A[0, :free], A[:, free:]
     decrease = -(top @ P @ E[0, :free].T + E[0, :free] @ P @ top.T)
-    rho = 0.5 / scipy.linalg.eigh(2.0 * top @ top.T, decrease, eigvals_only=True)[-1]
+    largest = scipy.linalg.eigh(2.0 * top @ top.T, decrease, eigvals_only=True)[-1] if free else 0.0
+    rho = 0.5 / largest if largest > 0.0 else 1.0
     C = P @ E.transpose(0, 2, 1) + rho * A.transpose(0, 2, 1)
     L1, L2 = C[0, :, :free], C[:, :, free:].mean(axis=0)
     rest = C[:, :, free:] - L2
-    eta = float(np.abs(below @ L2).max())
+    eta = float(np.abs(below @ L2).max()) or float(np.abs(L2).max())
     own = -below @ L2 - 0.5 * (rest.transpose(0, 2, 1) @ rest / (2.0 * rho) + eta * np.eye(model.inputs))
     return np.asarray(np.concatenate([-below @ L1 - (top @ L2).T, own], axis=2) @ np.linalg.inv(T))

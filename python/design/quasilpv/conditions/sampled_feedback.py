@@ -28,21 +28,17 @@ from quasilpv.conditions.condition import (
     Options,
     Statement,
     descriptor_statement,
-    require_regular,
 )
+from quasilpv.conditions.reliance import Reliance
 from quasilpv.lmi import Expression, Variable, block, he
 from quasilpv.polytopes import PolytopicModel
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State the condition for a regular system.
 
     Unknowns ``P = P' > 0`` (n, n) and F_j (m, n) per vertex.
-
-    Raises:
-        InputError: the system has algebraic states.
     """
-    require_regular(model, "sampled-feedback")
     h = Fraction(options.sample_period_s)
     rate = (1 - Fraction(exp(-2.0 * options.decay_rate * options.sample_period_s))) / h
 
@@ -62,5 +58,14 @@ CONDITION = Condition(
     summary="regular systems: state feedback for Euler's sampled model, contraction per sample",
     reference="this project, after Dehak 2022, Theorem II.6",
     representation="per-premise",
-    build=build,
+    inequalities=inequalities,
+    relies_on=(
+        Reliance.REGULAR,
+        Reliance.KNOWN_E,
+        Reliance.INDEX_ONE,
+        Reliance.STATE,
+        Reliance.SCHEDULED,
+        Reliance.EULER,
+        Reliance.DOMAIN,
+    ),
 )

@@ -22,28 +22,25 @@ from math import exp
 import numpy as np
 
 from quasilpv.conditions.blocks import double_sum
-from quasilpv.conditions.condition import Condition, Feedback, Options, Statement, Values, require_regular
+from quasilpv.conditions.condition import Condition, Feedback, Options, Statement, Values
 from quasilpv.conditions.gains import ObserverGain
+from quasilpv.conditions.reliance import Reliance
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable, block, he, to_rational
 from quasilpv.polytopes import PolytopicModel
-from quasilpv.polytopes.model import unknown_premises
 
 MULTIPLIER_SAMPLES = 20
 """Ratio t/h of the two multipliers; any value is sound."""
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State the condition.
 
     Unknowns ``Q = Q' > 0`` (n, n), and per vertex H_j (n, n) and Y_j (n, outputs).
 
     Raises:
-        InputError: the system has algebraic states, unknown premises, or an output matrix that depends on premises.
+        InputError: the output matrix depends on premises.
     """
-    require_regular(model, "sampled-observer")
-    if unknown_premises(model.system):
-        raise InputError("condition sampled-observer", model.system.name, "unknown premises", "a system without")
     if model.system.C.coefficients.any():
         raise InputError("condition sampled-observer", model.system.name, "C with premises", "a constant C")
     n, count = model.order, model.vertex_count
@@ -76,5 +73,14 @@ CONDITION = Condition(
     summary="regular systems with measured premises: observer for Euler's sampled model",
     reference="this project, by Finsler's lemma",
     representation="per-premise",
-    build=build,
+    inequalities=inequalities,
+    relies_on=(
+        Reliance.REGULAR,
+        Reliance.NO_UNKNOWN,
+        Reliance.INDEX_ONE,
+        Reliance.OUTPUTS,
+        Reliance.MEASURED,
+        Reliance.EULER,
+        Reliance.DOMAIN,
+    ),
 )

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from quasilpv.conditions import i2
 from quasilpv.conditions.condition import Condition
+from quasilpv.conditions.reliance import COMPENSATION
 
 CONDITION = Condition(
     id="tanaka-wang",
     summary="fuzzy descriptor systems, common Lyapunov matrix; I.2 on all combinations of bounds",
     reference="Tanaka and Wang 2004, chapter 10",
     representation="ts",
-    build=i2.build,
+    inequalities=i2.inequalities,
+    relies_on=COMPENSATION,
 )

@@ -21,12 +21,13 @@ from quasilpv.conditions.condition import (
 )
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, on_differential
 from quasilpv.conditions.gains import on_state
+from quasilpv.conditions.reliance import COMPENSATION
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.expressions import as_expression
 from quasilpv.polytopes import PolytopicModel
 
 
-def build(model: PolytopicModel, options: Options) -> Statement:
+def inequalities(model: PolytopicModel, options: Options) -> Statement:
     """State the condition.
 
     Unknowns ``V = V' > 0`` (q, q), and per vertex W_j (n, q), Z_j (n, n) and M_j (m, q).
@@ -55,5 +56,6 @@ CONDITION = Condition(
     summary="I.2 with lower blocks of the Lyapunov matrix that depend on the premises",
     reference="this project, after Dehak 2022, Theorem I.2, and Guerra, Bernal, Kruszewski and Afroun 2007",
     representation="ts",
-    build=build,
+    inequalities=inequalities,
+    relies_on=COMPENSATION,
 )

@@ -64,7 +64,7 @@ def extended_feedback(system: DescriptorSystem, decay_per_s: float) -> Feedback:
         InfeasibleError: there is no verified solution.
     """
     model = polytopic_model(system, i53.CONDITION.representation)
-    statement = i53.build(model, Options(decay_rate=decay_per_s))
+    statement = i53.CONDITION.build(model, Options(decay_rate=decay_per_s))
     solution = statement.problem.solve_inside(0.1)
     if not solution.verified:
         raise InfeasibleError(f"{system.name}: no verified solution of I.53 with decay rate {decay_per_s:g} 1/s")

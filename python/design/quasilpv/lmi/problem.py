@@ -93,7 +93,7 @@ class Problem:
         return tuple(dict.fromkeys(v for e in expressions for v in e.variables))
 
     def positive(self, name: str, expression: Operand) -> None:
-        """Require ``expression > 0``.
+        """Require ``expression > 0``; of an expression without rows that is nothing.
 
         Raises:
             ValueError: the expression is not square, or the name is taken.
@@ -103,6 +103,8 @@ class Problem:
             raise ValueError(f"{name}: an inequality is square, got {square.shape}")
         if name in self._names:
             raise ValueError(f"{name}: there is already an inequality of that name")
+        if square.shape[0] == 0:
+            return
         self._names.add(name)
         self._constraints.append(Constraint(name, square))
 

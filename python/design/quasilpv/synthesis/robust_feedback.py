@@ -38,7 +38,9 @@ def robust_solver(robot: Robot) -> Solver:
     def solve(model: PolytopicModel, decay: float, rate: float) -> Candidate | None:
         """The model is the shipped one, with premise theta^2; the theorem is applied to the disc's descriptor model."""
         uncertain = descriptor_model(disc, largest_delta, model.system.premises[0])
-        statement = iii9.build(polytopic_model(uncertain, iii9.CONDITION.representation), Options(decay_rate=decay))
+        statement = iii9.CONDITION.build(
+            polytopic_model(uncertain, iii9.CONDITION.representation), Options(decay_rate=decay)
+        )
         unknowns = statement.problem.variables
         V = [variable.expression for variable in unknowns if variable.name.startswith("V")]
         gains = [variable for variable in unknowns if variable.name.startswith("F")]

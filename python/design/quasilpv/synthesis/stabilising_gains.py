@@ -140,7 +140,7 @@ def solve_pdc(model: PolytopicModel, decay: float, rate: float) -> Candidate | N
 
 def solve_descriptor(model: PolytopicModel, decay: float, rate: float) -> Candidate | None:
     """Theorem II.6 with common L and R, a single sum with one slack matrix per block."""
-    statement = ii6.build(model, Options(decay_rate=decay, common=True, form=Form.PUBLISHED))
+    statement = ii6.CONDITION.build(model, Options(decay_rate=decay, common=True, form=Form.PUBLISHED))
     solved = _SingleSum.of(statement, "P", "F", model.vertex_count, rate)
     if solved is None:
         return None
