@@ -145,7 +145,8 @@ class Condition:
         """State it for a model.
 
         Raises:
-            InputError: something the condition relies on is refuted (named), or the condition does not apply.
+            RefusedError: something the condition relies on is refuted (named).
+            InputError: the condition does not apply for another reason.
         """
         refuse_refuted(self.id, self.relies_on, model)
         return self.inequalities(model, options)

@@ -26,32 +26,44 @@ MAX_CORNERS_OF = 6
 """Premises whose corners are all looked at; of more, every one is a block of its own, with slack."""
 
 
-def proof_of_invertibility(system: DescriptorSystem) -> str | None:
+WELL_CONDITIONED = 1e12
+"""Condition number up to which the inverse at the centre is worth trying."""
+
+
+def proof_of_invertibility(*systems: DescriptorSystem) -> str | None:
     """How E_1(z), the block of E of the differential states, was proved invertible over the box; None if it was not.
 
     That it was not says nothing: `quasilpv.systems.structure` has other means, and those that refute.
+
+    Args:
+        systems: one, or several with the same premises that differ in numbers: then every convex combination of them.
     """
-    q = system.differential
-    constant, coefficients = system.E.constant[:q, :q], system.E.coefficients[:, :q, :q]
-    used = [p for p in range(len(system.premises)) if coefficients[p].any()]
-    box = tuple(system.premises[p].bounds for p in used)
-    return _proof(constant.tobytes(), coefficients[used].tobytes(), q, box)
+    q, premises = systems[0].differential, range(len(systems[0].premises))
+    slopes = [system.E.coefficients[:, :q, :q] for system in systems]
+    used = [p for p in premises if any(own[p].any() for own in slopes)]
+    box = tuple(systems[0].premises[p].bounds for p in used)
+    numbers = {
+        (system.E.constant[:q, :q].tobytes(), own[used].tobytes()) for system, own in zip(systems, slopes, strict=True)
+    }
+    return _proof(tuple(sorted(numbers)), q, box)
 
 
 @lru_cache(maxsize=256)
-def _proof(constant: bytes, coefficients: bytes, size: int, box: tuple[tuple[float, float], ...]) -> str | None:
+def _proof(numbers: tuple[tuple[bytes, bytes], ...], size: int, box: tuple[tuple[float, float], ...]) -> str | None:
     """The same of E_1 by its numbers: systems that differ in A and B only are asked about again and again."""
-    E0 = np.frombuffer(constant).reshape(size, size)
-    slopes = np.frombuffer(coefficients).reshape(len(box), size, size)
-    if not box:
-        return None if null_space(to_rational(E0)).shape[1] else "E is constant and invertible"
-    low, high = np.array(box).T
-    centre = E0 + np.tensordot(0.5 * (low + high), slopes, axes=1)
+    affine = [
+        (np.frombuffer(constant).reshape(size, size), np.frombuffer(slopes).reshape(len(box), size, size))
+        for constant, slopes in numbers
+    ]
+    if not box and len(affine) == 1:
+        return None if null_space(to_rational(affine[0][0])).shape[1] else "E is constant and invertible"
+    low, high = np.array(box).reshape(-1, 2).T
     if len(box) <= MAX_CORNERS_OF:
-        corners = [_at(E0, slopes, corner) for corner in product(*box)]
-        if np.linalg.cond(centre) < 1e12 and _all_positive(corners, np.linalg.inv(centre)):
+        corners = [_at(*own, corner) for own in affine for corner in product(*box)]
+        centre = np.mean([corner.astype(float) for corner in corners], axis=0)
+        if np.linalg.cond(centre) < WELL_CONDITIONED and _all_positive(corners, np.linalg.inv(centre)):
             return "He(E(z) G) > 0 at the corners of the box, G the inverse at its centre"
-    problem = _problem(E0, slopes, low, high)
+    problem = _problem(affine, low, high)
     return "He(E(z) G) > 0 over the box for a G" if decide(CompiledProblem.of(problem)).feasible else None
 
 
@@ -69,16 +81,17 @@ def _all_positive(matrices: list[Matrix], G: Matrix) -> bool:
     return all(is_positive_definite(symmetric_part(E @ right)) for E in matrices)
 
 
-def _problem(constant: Matrix, slopes: Matrix, low: Matrix, high: Matrix) -> Problem:
-    """``He(E_i G) > 0`` at the vertices, with slack if there are several blocks."""
-    few = len(slopes) <= MAX_CORNERS_OF
+def _problem(affine: list[tuple[Matrix, Matrix]], low: Matrix, high: Matrix) -> Problem:
+    """``He(E_i G) > 0`` at the vertices, one G, with slack if there are several blocks."""
+    few = len(low) <= MAX_CORNERS_OF
     polytope = (BlockPolytope.takagi_sugeno if few else BlockPolytope.per_premise)(low, high)
-    vertices = [_at(constant, slopes, offset) for offset in polytope.exact_vertex_offsets]
-    G = Variable("G", len(constant))
-
-    def entry(i: int) -> Expression:
-        return as_expression(-(vertices[i] @ G))
-
+    G = Variable("G", len(affine[0][0]))
     problem = Problem()
-    single_sum(problem, "E G", entry, len(vertices), polytope.block_index)
+    for k, own in enumerate(affine):
+        vertices = [_at(*own, offset) for offset in polytope.exact_vertex_offsets]
+
+        def entry(i: int, vertices: list[Matrix] = vertices) -> Expression:
+            return as_expression(-(vertices[i] @ G))
+
+        single_sum(problem, f"E G {k}", entry, len(vertices), polytope.block_index)
     return problem

@@ -113,6 +113,10 @@ def reliances(relies_on: Sequence[Reliance], model: PolytopicModel) -> tuple[Rel
     return tuple(Relied(reliance, *_CHECKS[reliance](model)) for reliance in relies_on)
 
 
+class RefusedError(InputError):
+    """A condition does not apply to a system: something it relies on is refuted, or has to be proved and is not."""
+
+
 def refuse_refuted(condition: str, relies_on: Sequence[Reliance], model: PolytopicModel) -> None:
     """Refuse what is refuted, and what is in `MUST_BE_PROVED` and is not.
 
@@ -125,7 +129,7 @@ def refuse_refuted(condition: str, relies_on: Sequence[Reliance], model: Polytop
         model: the system in its representation.
 
     Raises:
-        InputError: something is refused; names it.
+        RefusedError: something is refused; names it.
     """
     for reliance in relies_on:
         if reliance not in _EXPECTED:
@@ -133,7 +137,7 @@ def refuse_refuted(condition: str, relies_on: Sequence[Reliance], model: Polytop
         check = _index_one_at_all if reliance is Reliance.INDEX_ONE else _CHECKS[reliance]
         status, detail = check(model)
         if status is Status.REFUTED or (status is Status.ASSUMED and reliance in MUST_BE_PROVED):
-            raise InputError(f"condition {condition}", model.system.name, detail, _EXPECTED[reliance])
+            raise RefusedError(f"condition {condition}", model.system.name, detail, _EXPECTED[reliance])
 
 
 _Found = tuple[Status, str]

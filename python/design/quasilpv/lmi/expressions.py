@@ -140,8 +140,8 @@ class Product:
 
     def scaled(self, left: Matrix | None, right: Matrix | None) -> Product:
         """``left @ term @ right``."""
-        new_left = self.left if left is None else left @ self.left
-        new_right = self.right if right is None else self.right @ right
+        new_left = self.left if left is None else _product(left, self.left)
+        new_right = self.right if right is None else _product(self.right, right)
         return Product(new_left, self.variable, new_right, self.transposed)
 
     def times(self, factor: Any) -> Product:
@@ -201,8 +201,8 @@ class ScalarProduct:
 
     def scaled(self, left: Matrix | None, right: Matrix | None) -> ScalarProduct:
         """``left @ term @ right``."""
-        new = self.coefficient if left is None else left @ self.coefficient
-        return ScalarProduct(new if right is None else new @ right, self.variable)
+        new = self.coefficient if left is None else _product(left, self.coefficient)
+        return ScalarProduct(new if right is None else _product(new, right), self.variable)
 
     def times(self, factor: Any) -> ScalarProduct:
         """``factor * term`` for a number."""
@@ -239,6 +239,26 @@ def _placed(matrix: Matrix, rows: slice, columns: slice, shape: tuple[int, int])
     larger = _zero(*shape)
     larger[rows, columns] = matrix
     return larger
+
+
+def _product(left: Matrix, right: Matrix) -> Matrix:
+    """``left @ right`` without the products of exact zeros, of which there are many."""
+    if left.dtype != object or right.dtype != object or left.shape[1:] != right.shape[:1]:
+        product: Matrix = left @ right
+        return product
+    rows: dict[int, list[tuple[int, Any]]] = {}
+    for p, j in zip(*(places.tolist() for places in np.nonzero(right)), strict=True):
+        rows.setdefault(p, []).append((j, right[p, j]))
+    total: dict[tuple[int, int], Any] = {}
+    for i, p in zip(*(places.tolist() for places in np.nonzero(left)), strict=True):
+        factor = left[i, p]
+        for j, entry in rows.get(p, ()):
+            value = factor * entry
+            total[i, j] = total[i, j] + value if (i, j) in total else value
+    result = _zero(left.shape[0], right.shape[1])
+    for place, value in total.items():
+        result[place] = value
+    return result
 
 
 def _scaled(matrix: Matrix, factor: Any) -> Matrix:
@@ -309,11 +329,11 @@ class Expression:
 
     def __matmul__(self, other: Matrix) -> Expression:
         """Product with a constant matrix on the right."""
-        return Expression(self.constant @ other, tuple(term.scaled(None, other) for term in self.terms))
+        return Expression(_product(self.constant, other), tuple(term.scaled(None, other) for term in self.terms))
 
     def __rmatmul__(self, other: Matrix) -> Expression:
         """Product with a constant matrix on the left."""
-        return Expression(other @ self.constant, tuple(term.scaled(other, None) for term in self.terms))
+        return Expression(_product(other, self.constant), tuple(term.scaled(other, None) for term in self.terms))
 
     def at(self, values: Mapping[Variable, Matrix]) -> Matrix:
         """Value at a point; exact when constants and values are exact.

@@ -135,11 +135,14 @@ def examine(case: Case, first: Decision) -> Finding:
 
 
 def stated(condition: Condition, model: PolytopicModel, options: Options, units: Units | None = None) -> Statement:
-    """A condition written for a model, or for the same model in other units. Errors are those of the condition."""
+    """The inequalities of a condition for a model, or for the same model in other units.
+
+    That the model has what the condition relies on is for the caller to see to. Errors: `Condition.inequalities`.
+    """
     if units is None:
-        return condition.build(model, options)
+        return condition.inequalities(model, options)
     rescaled = PolytopicModel(units.of(model.system), model.polytope)
-    return condition.build(rescaled, options.in_units(units))
+    return condition.inequalities(rescaled, options.in_units(units))
 
 
 def no_solution(decision: Decision) -> Finding:

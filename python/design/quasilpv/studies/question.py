@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from quasilpv.conditions.condition import Options, Statement
+from quasilpv.conditions.invertibility import proof_of_invertibility
 from quasilpv.conditions.registry import condition
+from quasilpv.conditions.reliance import RefusedError, Reliance, refuse_refuted
 from quasilpv.lmi import largest_margin
 from quasilpv.lmi.common import common_problem
 from quasilpv.lmi.compiled import CompiledFamily, CompiledProblem, compile_family
@@ -72,6 +74,16 @@ class Question:
         Raises:
             InputError: the condition does not apply to the system, or the representation does not.
         """
+        known = condition(self.condition)
+        refuse_refuted(known.id, known.relies_on, self.model())
+        return self.inequalities(units)
+
+    def inequalities(self, units: Units | None = None) -> Statement:
+        """The same whether or not what the condition relies on is there: a solution alone proves nothing.
+
+        Raises:
+            InputError: the inequalities cannot be written down for the system, or the representation does not apply.
+        """
         return stated(condition(self.condition), self.model(), self.options, units)
 
     def model(self) -> PolytopicModel:
@@ -103,6 +115,9 @@ class Sweep:
         """Compile the family, if it is one."""
         self.question = question
         self.swept = tuple(swept)
+        known = condition(question.condition)
+        left = {Reliance.INVERTIBLE_E, Reliance.INDEX_ONE} if self.swept else set()  # these may depend on the point
+        refuse_refuted(known.id, [one for one in known.relies_on if one not in left], question.model())
         self._family = self._compile()
 
     @property
@@ -120,9 +135,30 @@ class Sweep:
         compiled = self._problem([point])
         decision = decide(compiled)
         if decision.feasible:
-            return _answer(compiled, solution(decision, 1), start)
-        case = _case(self.question, compiled, lambda: self.question.at(point).model(), self._sketch(point))
-        return _answer(compiled, examine(case, decision), start)
+            finding = solution(decision, 1)
+        else:
+            case = _case(self.question, compiled, lambda: self.question.at(point).model(), self._sketch(point))
+            finding = examine(case, decision)
+        refused = self._refused([point]) if finding.verdict is Verdict.FEASIBLE else None
+        if refused is not None:
+            finding = Finding(Verdict.UNKNOWN, None, refused, decision)
+        return _answer(compiled, finding, start)
+
+    def _refused(self, points: Sequence[Mapping[str, float]]) -> str | None:
+        """Why a solution of the inequalities proves nothing at these points and between them; None if it does."""
+        known = condition(self.question.condition)
+        if not self.swept or Reliance.INVERTIBLE_E not in known.relies_on:
+            return None
+        sketches = [self._sketch(point) or self.question.at(point).model() for point in points]
+        if proof_of_invertibility(*(sketch.system for sketch in sketches)) is not None:
+            return None
+        if len({sketch.system.E.constant.tobytes() for sketch in sketches}) > 1:
+            return "E(z) is not proved invertible between the points"
+        try:
+            refuse_refuted(known.id, known.relies_on, self.question.at(points[0]).model())
+        except RefusedError as error:
+            return error.got
+        return None
 
     def common(self, points: Sequence[Mapping[str, float]]) -> Answer:
         """One solution for several points: it holds in their whole convex hull (`quasilpv.lmi.common`).
@@ -140,7 +176,8 @@ class Sweep:
         decision, units = decide(compiled), None
         if not decision.feasible and self._units is not None:
             decision, units = decide(self._problem(points, self._units)), self._units
-        finding = solution(decision, 1, units=units) if decision.feasible else no_solution(decision)
+        proves = decision.feasible and self._refused(points) is None
+        finding = solution(decision, 1, units=units) if proves else no_solution(decision)
         return _answer(compiled, finding, start)
 
     def proves(
@@ -161,7 +198,7 @@ class Sweep:
         if self._family is not None and units is None:
             return common_problem(self._family, places)
         if len(points) == 1:
-            return CompiledProblem.of(self.question.at(places[0]).statement(units).problem)
+            return CompiledProblem.of(self.question.at(places[0]).inequalities(units).problem)
         if self._family is None or units != self._units or self._rescaled is None:
             raise ValueError(f"the data are not affine in {', '.join(self.swept)}: points have nothing in common")
         return common_problem(self._rescaled, places)
@@ -174,7 +211,7 @@ class Sweep:
     @cached_property
     def _rescaled(self) -> CompiledFamily | None:
         """The family in those units."""
-        return compile_family(lambda point: self.question.at(point).statement(self._units).problem, self._base())
+        return compile_family(lambda point: self.question.at(point).inequalities(self._units).problem, self._base())
 
     def _sketch(self, point: Mapping[str, float]) -> PolytopicModel | None:
         """The system at a point, up to rounding, where it need not be built anew; the premises are those of all."""
@@ -209,7 +246,7 @@ class Sweep:
         parameters = system_kind(self.question.system).parameters
         if not self.swept or not all(parameters[name].affine for name in self.swept):
             return None
-        return compile_family(lambda point: self.question.at(point).statement().problem, self._base())
+        return compile_family(lambda point: self.question.at(point).inequalities().problem, self._base())
 
 
 def answered(question: Question) -> Answer:
@@ -220,6 +257,7 @@ def answered(question: Question) -> Answer:
     """
     start = time.perf_counter()
     known, model = condition(question.condition), question.model()
+    refuse_refuted(known.id, known.relies_on, model)
     statement = stated(known, model, question.options)
     compiled = CompiledProblem.of(statement.problem)
     decision = decide(compiled)
