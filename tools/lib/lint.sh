@@ -16,6 +16,6 @@ mapfile -t shell_files < <(git grep --files-with-matches --max-count=1 '^#!/usr/
 lint .venv/bin/ruff check .
 lint .venv/bin/ruff format --check .
 lint .venv/bin/mypy
-lint clang-format --dry-run -Werror "${cpp_files[@]}"
+lint .venv/bin/clang-format --dry-run -Werror "${cpp_files[@]}"
 lint shellcheck --external-sources --check-sourced --source-path=. "${shell_files[@]}"
 exit "$status"
