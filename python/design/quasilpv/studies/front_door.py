@@ -60,7 +60,7 @@ def boundary(
     """Where a condition stops being feasible along one parameter, by bisection.
 
     Args:
-        system, condition, **options: as for `solve`.
+        system, condition, options: as for `solve`.
         over: name of the parameter and the two ends of its range, e.g. ``("b", 0.0, 30.0)``.
         tolerance: width of the final interval, relative to where it is.
 
@@ -83,7 +83,7 @@ def region(
     """A map of where a condition is feasible over two parameters.
 
     Args:
-        system, condition, **options: as for `solve`.
+        system, condition, options: as for `solve`.
         x, y: name of a parameter, first and last value, number of values, e.g. ``("a", -8.0, 8.0, 17)``.
         grid: every point of the grid, instead of what is needed to tell where the condition holds.
         processes: how many solve at once; systems of the running program travel to them by value.

@@ -39,13 +39,11 @@ SYSTEMS: Mapping[str, SystemKind] = MappingProxyType({kind.id: kind for kind in 
 def system_kind(reference: str | SystemKind) -> SystemKind:
     """The system, or the family of systems, that a reference names.
 
-    Every place that takes a system by name goes through here.
+    Every place that takes a system by name goes through here. A reference stands for
 
-    | reference | stands for |
-    |---|---|
-    | ``ex-I.1`` | an entry of the catalogue |
-    | another name | an entry point of the group `ENTRY_POINT_GROUP` of an installed package |
-    | ``FILE.py:NAME`` | a system, or a function of parameters with defaults, in a Python file, which is executed |
+    * ``ex-I.1``: an entry of the catalogue,
+    * another name: an entry point of the group `ENTRY_POINT_GROUP` of an installed package,
+    * ``FILE.py:NAME``: a system, or a function of parameters with defaults, in a Python file, which is executed.
 
     A kind stands for itself.
 
