@@ -63,7 +63,7 @@ VERB_ARGUMENTS = {
     "boundary": Call(("ex-I.1",), QUESTION | {"--over": "b=0:1"}, stubs=("find_boundary",)),
     "region": Call(("ex-I.1",), QUESTION | {"--x": "a=0:1:2", "--y": "b=0:1:2"}, stubs=("Checkpoint",)),
     "complexity": Call(("ex-I.1",), QUESTION, stubs=("print_table",)),
-    "reproduce": Call(("fig-I.1",), stubs=("reproduce",)),
+    "reproduce": Call(("fig-II.1",), stubs=("reproduce",)),
 }
 
 

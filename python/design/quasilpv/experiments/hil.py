@@ -251,7 +251,9 @@ def _run_both(commands: dict[str, list[str]], limit_s: float) -> tuple[dict[str,
     If one fails, the others are stopped. A fault stop is no failure: the other process ends by itself.
     """
     processes = {
-        name: subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        name: subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, encoding="utf-8", errors="surrogateescape"
+        )
         for name, command in commands.items()
     }
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -111,12 +112,19 @@ def write_run_files(
     """Write artifact, trajectory and scenario of one run into ``folder``; arguments as those of `track`.
 
     Raises:
-        InputError: the controller is for another robot, or the folder cannot be written.
+        InputError: the controller is for another robot, the reference shorter than its sample, or the folder cannot be
+            written.
     """
     if artifact.robot.id != experiment.robot.id:
         raise InputError(
             artifact.name, "robot.id", artifact.robot.id, f"{experiment.robot.id}, which {experiment.name} is for"
         )
+    if experiment.trajectory.duration_s < artifact.sample_period_s:
+        got, expected = (
+            f"{experiment.trajectory.duration_s:g} s",
+            f"at least one sample, {artifact.sample_period_s:g} s",
+        )
+        raise InputError(experiment.name, "duration_s", got, expected)
     scenario = build_scenario(
         experiment.robot,
         experiment.trajectory,
@@ -164,9 +172,11 @@ def track(
     files = write_run_files(
         folder, experiment, artifact, plant=plant, sensors=sensors, transport_delay_s=transport_delay_s
     )
-    runtime = _runtime.Artifact.load(str(files.artifact))
+    # As bytes: a name need not be text.
     columns = _runtime.run_closed_loop(
-        runtime, _runtime.Trajectory.load(str(files.trajectory)), _runtime.Scenario.load(str(files.scenario))
+        _runtime.Artifact.load(os.fsencode(files.artifact)),
+        _runtime.Trajectory.load(os.fsencode(files.trajectory)),
+        _runtime.Scenario.load(os.fsencode(files.scenario)),
     )
     variant = variant or variant_of(artifact, sensors)
     if log:

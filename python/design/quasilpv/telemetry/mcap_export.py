@@ -32,7 +32,7 @@ def write_mcap(log: RunLog, path: Path) -> int:
 
 def _write(log: RunLog, writer: Writer) -> int:
     writer.start(profile="", library="quasilpv")
-    metadata = {"source": log.source}
+    metadata = {"source": log.source.encode(errors="backslashreplace").decode()}  # a name need not be text
     if ARTIFACT in log.documents:
         metadata |= {"artifact": log.artifact.name, "artifact_hash": log.artifact.hash}
     writer.add_metadata("quasilpv", metadata)
