@@ -1,8 +1,9 @@
 """Scenarios: what the registry builds, and the rules of the format."""
 
+import copy
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,10 @@ import numpy as np
 import pytest
 
 from quasilpv import _runtime
-from quasilpv.artifact.canonical import canonical_json
+from quasilpv.artifact import write_artifact
+from quasilpv.artifact.canonical import canonical_json, parse_strict_json
 from quasilpv.errors import InputError
+from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.release import release
 from quasilpv.scenarios import (
     OPTIONAL,
@@ -29,8 +32,10 @@ from quasilpv.scenarios import (
     tracking_tasks,
     write_scenario,
 )
+from quasilpv.synthesis import Specification
 from quasilpv.systems.registry import robot
-from quasilpv.trajectories import Trajectory
+from quasilpv.trajectories import Trajectory, rest
+from quasilpv.trajectories.document import write_trajectory
 
 ARM3 = robot("arm3")
 TRAJECTORIES = {task.id: task.trajectory(ARM3.model, ARM3.domain) for task in tracking_tasks() if task.robot == "arm3"}
@@ -312,3 +317,100 @@ def test_when_a_member_with_a_default_is_missing_in_a_file_expect_it_refused(pat
     with pytest.raises(InputError, match="got nothing, expected this member") as error:
         Scenario.from_document(document)
     assert error.value.field == field
+
+
+# ---- both languages refuse the same documents ------------------------------------------------------------------------
+
+ODD_NUMBERS = (1e308, -1e308, 1e18, -1e18, 2e16, 1e16, -1.0, 0.0, 0.5, 1e-300, 7.0)
+
+
+def numbers_of(tree: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Where the numbers of a document are."""
+    if isinstance(tree, dict | list):
+        for key, member in tree.items() if isinstance(tree, dict) else enumerate(tree):
+            yield from numbers_of(member, (*path, key))
+    elif isinstance(tree, int | float) and not isinstance(tree, bool):
+        yield path
+
+
+def with_number(tree: dict[str, Any], path: tuple[Any, ...], value: float) -> dict[str, Any]:
+    changed = copy.deepcopy(tree)
+    *parents, last = path
+    place: Any = changed
+    for key in parents:
+        place = place[key]
+    place[last] = value
+    return changed
+
+
+def refused_by_both(data: bytes) -> bool:
+    """Whether a scenario is refused; by both languages, each with a line, or by none."""
+    messages = []
+    for parse in (
+        lambda: Scenario.from_document(parse_strict_json(data, "scenario.json"), "scenario.json"),
+        lambda: _runtime.Scenario.parse(data, "scenario.json"),
+    ):
+        try:
+            parse()
+        except InputError as error:
+            messages.append(str(error))
+    assert len(messages) in (0, 2), messages
+    assert all(message.startswith("scenario.json: ") and "\n" not in message for message in messages)
+    return bool(messages)
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: build_scenario(ARM3, SQUARE).to_document(), five_bar_document, spring_disc_document]
+)
+def test_when_any_number_is_odd_expect_both_languages_to_agree_and_no_large_one_accepted(
+    make: Callable[[], dict[str, Any]],
+) -> None:
+    document = make()
+    places = list(numbers_of(document))
+    assert len(places) > 15
+    for place in places:
+        for value in ODD_NUMBERS:
+            refused = refused_by_both(json.dumps(with_number(document, place, value)).encode())
+            assert refused or abs(value) <= 1e16, (place, value)
+    for place, most in {"duration_s": 86400, "transport_delay_s": 10}.items():
+        assert not refused_by_both(json.dumps({**document, place: most}).encode())
+        assert refused_by_both(json.dumps({**document, place: most * 1.01}).encode())
+
+
+@pytest.mark.parametrize(
+    "spelling", ["NaN", "Infinity", "-Infinity", "1e999", "0x10", "01", "+1", ".5", "1.", "1_0", "", "'1'", "1,"]
+)
+def test_when_a_number_is_spelt_as_json_does_not_expect_both_languages_to_refuse_it(spelling: str) -> None:
+    text = json.dumps({**build_scenario(ARM3, SQUARE).to_document(), "duration_s": 123456789})
+    assert not refused_by_both(text.replace("123456789", "12345").encode())
+    assert refused_by_both(text.replace("123456789", spelling).encode())
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [(b"\xef\xbb\xbf", b""), (b"\xff\xfe", b""), (b"", b"\0"), (b"", b"{}"), (b"//\n", b""), (b"[", b"]")],
+)
+def test_when_something_stands_around_the_document_expect_both_languages_to_refuse_it(
+    before: bytes, after: bytes
+) -> None:
+    data = json.dumps(build_scenario(ARM3, SQUARE).to_document()).encode()
+    assert not refused_by_both(b" \n" + data + b"\n")
+    assert refused_by_both(before + data + after)
+
+
+@pytest.mark.parametrize("share", [1e-3, 0.4, 0.6, 0.999])
+def test_when_the_run_is_shorter_than_a_sample_expect_both_languages_to_refuse_it(share: float, tmp_path: Path) -> None:
+    artifact = release("arm3", "pid", Specification()).artifact
+    reference = rest("short", 3, share * artifact.sample_period_s)
+    experiment = TrackingExperiment("short", ARM3, reference)
+    with pytest.raises(InputError, match=r"short: duration_s: got .*, expected at least one sample"):
+        track(experiment, artifact, tmp_path, plant="nominal", sensors=Sensors())
+    path, _ = write_artifact(tmp_path, artifact)
+    trajectory = write_trajectory(tmp_path / "trajectory.json", reference)
+    scenario = write_scenario(tmp_path / "scenario.json", build_scenario(ARM3, reference))
+    with pytest.raises(InputError, match=r"duration_s: got .*, expected at least one sample"):
+        _runtime.run_closed_loop(
+            _runtime.Artifact.load(str(path)),
+            _runtime.Trajectory.load(str(trajectory)),
+            _runtime.Scenario.load(str(scenario)),
+        )

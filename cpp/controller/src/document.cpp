@@ -111,6 +111,8 @@ class StrictReader final : public nlohmann::json_sax<Json> {
   std::vector<Json*> open_;
 };
 
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
 void check_size(std::string_view bytes, const std::string& source) {
   if (bytes.empty() || bytes.size() > kMaxDocumentBytes) {
     throw InputError(source, "size", std::to_string(bytes.size()) + " bytes",
@@ -158,6 +160,10 @@ Json parse_document(std::string_view bytes, const std::string& source) {
 
 Json parse_strict_json(std::string_view bytes, const std::string& source) {
   check_size(bytes, source);
+  // nlohmann skips a byte order mark, which JSON does not have (RFC 8259, 8.1).
+  if (bytes.substr(0, kByteOrderMark.size()) == kByteOrderMark) {
+    throw InputError(source, "byte 0", "a byte order mark", "well-formed JSON");
+  }
   // nlohmann takes a zero byte for the end of the input, which would hide whatever follows it.
   const std::size_t zero = bytes.find('\0');
   if (zero != std::string_view::npos) {

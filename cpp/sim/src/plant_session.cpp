@@ -21,12 +21,11 @@ std::int64_t count_samples(const Scenario& scenario, double sample_period_s) {
     throw InputError(source, "transport_delay_s", std::to_string(scenario.transport_delay_s),
                      "0 to the sample period, " + std::to_string(sample_period_s));
   }
-  const std::int64_t samples = std::llround(scenario.duration_s / sample_period_s);
-  if (samples < 1) {
+  if (scenario.duration_s < sample_period_s) {
     throw InputError(source, "duration_s", std::to_string(scenario.duration_s),
                      "at least one sample of " + std::to_string(sample_period_s) + " s");
   }
-  return samples;
+  return std::llround(scenario.duration_s / sample_period_s);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "quasilpv/scenario.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -13,6 +14,32 @@ constexpr int kMaxEncoderBits = 32;
 constexpr std::int64_t kMaxSeed = 9007199254740991;  // 2^53 - 1, the largest integer every JSON reader keeps
 constexpr int kMaxStepsPerSample = 1000000;
 constexpr std::size_t kMaxSines = 1000;
+constexpr double kLargestNumber = 1e16;
+constexpr double kMaxDurationS = 86400.0;
+constexpr double kMaxTolerance = 0.1;
+constexpr double kMaxDelayS = 10.0;
+
+void require_bounded(const Field& field) {
+  const Json& value = field.json();
+  if (value.is_number() && !(std::abs(value.get<double>()) <= kLargestNumber)) {
+    field.fail(value.dump(), "a number of at most 1e16 in magnitude");
+  }
+  if (value.is_object()) {
+    for (const auto& [key, member] : value.items()) {
+      require_bounded(field[key]);
+    }
+  }
+  for (std::size_t i = 0; value.is_array() && i < value.size(); ++i) {
+    require_bounded(field.at(i));
+  }
+}
+
+double at_most(double limit, const Field& field, double value) {
+  if (value > limit) {
+    field.fail(field.json().dump(), "at most " + Json(limit).dump());
+  }
+  return value;
+}
 
 JointArray joint_array(const Field& field, int joints) {
   const std::vector<double> values = field.numbers(static_cast<std::size_t>(joints));
@@ -25,7 +52,10 @@ IntegratorOptions integrator(const Field& field) {
   const std::string kind = field["kind"].text();
   if (kind == "ida") {
     field.only({"kind", "relative_tolerance", "absolute_tolerance"});
-    return IdaOptions{field["relative_tolerance"].positive(), field["absolute_tolerance"].positive()};
+    const Field relative = field["relative_tolerance"];
+    const Field absolute = field["absolute_tolerance"];
+    return IdaOptions{at_most(kMaxTolerance, relative, relative.positive()),
+                      at_most(kMaxTolerance, absolute, absolute.positive())};
   }
   if (kind == "rk4") {
     field.only({"kind", "steps_per_sample"});
@@ -83,18 +113,19 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
              "transport_delay_s", "torque_limit_nm", "initial"});
   root["schema"].expect_text("quasilpv.scenario");
   static_cast<void>(root["schema_version"].integer(1, 1));
+  require_bounded(root);
   Scenario scenario;
   scenario.name = root["name"].text();
   if (scenario.name.empty()) {
     root["name"].fail("an empty name", "a name");
   }
-  scenario.duration_s = root["duration_s"].positive();
+  scenario.duration_s = at_most(kMaxDurationS, root["duration_s"], root["duration_s"].positive());
   scenario.plant = read_plant(root["plant"], source);
   const int n = scenario.joints();
   scenario.integrator = quasilpv::integrator(root["integrator"]);
   scenario.external_torque = quasilpv::external_torque(root["external_torque"], n);
   scenario.sensors = quasilpv::sensors(root["sensors"]);
-  scenario.transport_delay_s = root["transport_delay_s"].non_negative();
+  scenario.transport_delay_s = at_most(kMaxDelayS, root["transport_delay_s"], root["transport_delay_s"].non_negative());
   scenario.torque_limit_nm = torque_limit(root, n);
   const Field initial = root["initial"];
   initial.only({"angle_rad", "speed_rad_s"});

@@ -17,7 +17,14 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.canonical import MAX_SAFE_INTEGER, Document, member_path, normalise, parse_strict_json
+from quasilpv.artifact.canonical import (
+    MAX_SAFE_INTEGER,
+    Document,
+    member_path,
+    normalise,
+    parse_strict_json,
+    require_bounded,
+)
 from quasilpv.artifact.programs import MAX_JOINTS
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError, one_of
@@ -29,6 +36,9 @@ from quasilpv.trajectories.planning import Kinematics
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
+Tolerance = Annotated[float, Field(gt=0, le=0.1)]
+Duration = Annotated[float, Field(gt=0, le=86400)]
+Delay = Annotated[float, Field(ge=0, le=10)]
 Vector = tuple[float, ...]
 
 NOISE_SEED = 20220315
@@ -120,8 +130,8 @@ class IdaIntegrator(StrictModel):
     """SUNDIALS IDA (variable-order BDF) with its error tolerances."""
 
     kind: Literal["ida"] = "ida"
-    relative_tolerance: Positive = 1e-8
-    absolute_tolerance: Positive = 1e-10
+    relative_tolerance: Tolerance = 1e-8
+    absolute_tolerance: Tolerance = 1e-10
 
 
 class Rk4Integrator(StrictModel):
@@ -185,12 +195,12 @@ class Scenario(StrictModel):
     schema_: Literal["quasilpv.scenario"] = Field(alias="schema")
     schema_version: Literal[1]
     name: Annotated[str, Field(min_length=1)]
-    duration_s: Positive
+    duration_s: Duration
     plant: Plant
     integrator: Integrator
     external_torque: Annotated[tuple[SineTorque, ...], Field(max_length=1000)]
     sensors: Sensors
-    transport_delay_s: NonNegative
+    transport_delay_s: Delay
     torque_limit_nm: tuple[Positive, ...] | None = None
     initial: InitialState
 
@@ -223,6 +233,7 @@ class Scenario(StrictModel):
         Raises:
             InputError: a rule of the format is broken; the message names the field.
         """
+        require_bounded(document, source)
         scenario = validate(cls, document, source, tags=TAGS)
         for path in _missing_members(document, scenario.to_document(), ""):
             raise InputError(source, path, "nothing", "this member")

@@ -24,6 +24,8 @@ from quasilpv.files import MAX_FILE_BYTES
 
 MAX_DEPTH = 32
 MAX_SAFE_INTEGER = 2**53 - 1
+LARGEST_NUMBER = 1e16
+"""Of numbers that people write: products of a few of them are finite, and as a count none of them fits into memory."""
 
 Document = dict[str, Any]
 
@@ -178,6 +180,22 @@ def parse_strict_json(data: bytes, source: str) -> Document:
     except RecursionError as error:
         raise InputError(source, "document", "a deeper document", f"nesting of at most {MAX_DEPTH} levels") from error
     return _require_object(normalise(tree, source), source)
+
+
+def require_bounded(tree: object, source: str, path: str = "") -> None:
+    """Refuse numbers beyond `LARGEST_NUMBER` anywhere in a document written by people.
+
+    Raises:
+        InputError: the field and its value.
+    """
+    if isinstance(tree, Mapping):
+        for key, member in tree.items():
+            require_bounded(member, source, member_path(path, str(key)))
+    elif isinstance(tree, Sequence) and not isinstance(tree, str):
+        for i, item in enumerate(tree):
+            require_bounded(item, source, f"{path}[{i}]")
+    elif isinstance(tree, int | float) and abs(tree) > LARGEST_NUMBER:
+        raise InputError(source, path, f"{tree:g}", f"a number of at most {LARGEST_NUMBER:g} in magnitude")
 
 
 def _parse_cbor(data: bytes, source: str) -> Document:

@@ -10,11 +10,10 @@ from typing import Any
 import typer
 from pydantic import ValidationError
 
+from quasilpv.artifact.canonical import LARGEST_NUMBER
 from quasilpv.errors import InputError, one_of
 
 NUMBERS = {"float_parsing": "a number", "int_parsing": "a whole number", "int_from_float": "a whole number"}
-LARGEST_NUMBER = 1e15
-"""Of a number that a person gives: whole numbers up to here are exact, and products of a few of them are finite."""
 NUMBER_EXPECTED = f"a number between -{LARGEST_NUMBER:g} and {LARGEST_NUMBER:g}"
 _DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 LIMITS = {"greater_than_equal": ("at least", "ge"), "less_than_equal": ("at most", "le")}

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.canonical import parse_strict_json
+from quasilpv.artifact.canonical import parse_strict_json, require_bounded
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
 from quasilpv.files import read_bytes
 
@@ -241,4 +241,6 @@ def read_path(path: Path | str) -> TaskPath:
         InputError: the file cannot be read, is not strict JSON, or is not a path; the message names the field.
     """
     source = str(path)
-    return validate(TaskPath, parse_strict_json(read_bytes(path), source), source)
+    document = parse_strict_json(read_bytes(path), source)
+    require_bounded(document, source)
+    return validate(TaskPath, document, source)
