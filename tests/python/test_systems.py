@@ -81,7 +81,7 @@ def test_when_a_premise_is_an_uncertain_parameter_its_value_is_no_function_of_th
         domain={},
     )
     assert_array_equal(system.evaluate([0.5]).A, [[0.5]])
-    assert system.parameters == (delta,)
+    assert [parameter.name for parameter in system.parameters] == ["delta"]
     assert_array_equal(system.premise_values([0.0], {delta: -0.25}), [-0.25])
     with pytest.raises(InputError, match="toy: parameters: got none for delta, expected a value"):
         system.premise_values([0.0])

@@ -32,7 +32,7 @@ def compile_program(expressions: Sequence[sympy.Expr], inputs: Mapping[sympy.Sym
     """
     code: list[Instruction] = []
     for i, expression in enumerate(expressions):
-        _Compiler(inputs, f"output {i}", code).emit(sympy.sympify(expression))
+        _Compiler(inputs, f"output {i}", code).emit(sympy.sympify(expression, strict=True))
     if len(code) > MAX_LENGTH:
         raise InputError("program", "code", f"{len(code)} instructions", f"at most {MAX_LENGTH}")
     try:

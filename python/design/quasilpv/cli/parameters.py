@@ -27,8 +27,9 @@ SystemArgument: TypeAlias = Annotated[
     str,
     typer.Argument(
         metavar="SYSTEM",
-        help="A system of design list, or FILE.py:NAME, a system or a function of parameters with defaults in a file of"
-        " your own. FILE.py:NAME executes the code in FILE.py; nothing else does.",
+        help="A system of design list, FILE.json, a document of equations, or FILE.py:NAME, a system or a function of"
+        " parameters with defaults in a file of your own. FILE.py:NAME executes the code in FILE.py; no other form"
+        " executes code of a file.",
     ),
 ]
 ConditionOption: TypeAlias = Annotated[str, typer.Option("--condition", "-c", help="A condition of design list.")]

@@ -43,7 +43,7 @@ class PremiseBasis:
         stacked = np.zeros((len(self._names) + 1, *matrix.shape))
         for row in range(matrix.rows):
             for column in range(matrix.cols):
-                entry = sp.sympify(matrix[row, column])
+                entry = matrix[row, column]
                 stacked[:, row, column] = self._coefficients(f"{field}[{row},{column}]", entry)
         return AffineMatrix(stacked[0], stacked[1:])
 

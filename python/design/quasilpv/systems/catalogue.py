@@ -1,7 +1,8 @@
 """The descriptor systems known by name: the examples of Dehak 2022, the arms as stabilisation problems, a user's own.
 
 A new system of the catalogue is one builder in a file of its family and one line here. A system of a user needs no
-change here: `system_kind` also takes a name in a Python file and the entry points of installed packages.
+change here: `system_kind` also takes a name in a Python file, a JSON document of equations and the entry points of
+installed packages.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from types import MappingProxyType
 from quasilpv.errors import InputError, one_of
 from quasilpv.systems.arm_stabilisation import arm2_kind, arm3_kind, frictionless_arm3_kind
 from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.document import document_kind
 from quasilpv.systems.regular_example import regular_example
 from quasilpv.systems.singular_examples import rotation_example, singular_example, uncertain_example
 from quasilpv.systems.spring_disc import spring_disc
@@ -43,7 +45,8 @@ def system_kind(reference: str | SystemKind) -> SystemKind:
 
     * ``ex-I.1``: an entry of the catalogue,
     * another name: an entry point of the group `ENTRY_POINT_GROUP` of an installed package,
-    * ``FILE.py:NAME``: a system, or a function of parameters with defaults, in a Python file, which is executed.
+    * ``FILE.py:NAME``: a system, or a function of parameters with defaults, in a Python file, which is executed,
+    * ``FILE.json``: a document of equations as text (`quasilpv.systems.document`); nothing is executed.
 
     A kind stands for itself.
 
@@ -59,11 +62,13 @@ def system_kind(reference: str | SystemKind) -> SystemKind:
         return SYSTEMS[reference]
     if is_python_reference(reference):
         return python_file_kind(reference)
+    if reference.endswith(".json"):
+        return document_kind(reference)
     installed = entry_point_kinds()
     if reference in installed:
         return entry_point_kind(installed[reference])
     names = one_of(system_names(), reference)
-    raise InputError("systems", "system", reference, f"{names}; or FILE.py:NAME")
+    raise InputError("systems", "system", reference, f"{names}; or FILE.py:NAME, FILE.json")
 
 
 def system_names() -> list[str]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
 from functools import cached_property
-from typing import Any, NamedTuple
+from math import inf, nextafter
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import sympy as sp
@@ -13,10 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from quasilpv.errors import InputError
 from quasilpv.systems.affine_terms import PremiseBasis
-from quasilpv.systems.equations import equation_matrices
+from quasilpv.systems.equations import Equilibrium, equation_matrices
+from quasilpv.systems.measured import with_kinds
 from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
 from quasilpv.systems.premise_search import find_premises
 from quasilpv.systems.uncertainty import NormBoundedUncertainty
+from quasilpv.systems.vocabulary import Bounds, Formula, Name, Vocabulary, symbol
+
+SymbolicMatrix: TypeAlias = "sp.Matrix | Sequence[Sequence[Formula]]"
+"""A matrix of sympy, or rows of expressions, numbers and formulas as text."""
 
 SHOWN_PREMISES = 6
 """In the short description of a system."""
@@ -58,6 +65,7 @@ class DescriptorSystem:
     B: AffineMatrix
     C: AffineMatrix
     domain: Mapping[sp.Symbol, tuple[float, float]]
+    disturbance: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse parts whose sizes disagree and states in another order than differential, algebraic."""
@@ -80,83 +88,131 @@ class DescriptorSystem:
     def from_symbols(
         cls,
         *,
-        name: str,
-        state: Sequence[sp.Symbol],
-        inputs: Sequence[str],
-        E: sp.Matrix,
-        A: sp.Matrix,
-        B: sp.Matrix,
-        C: sp.Matrix,
-        domain: Mapping[sp.Symbol, tuple[float, float]],
+        name: str = "system",
+        state: str | Sequence[Name],
+        inputs: str | Sequence[Name] = (),
+        E: SymbolicMatrix,
+        A: SymbolicMatrix,
+        B: SymbolicMatrix,
+        C: SymbolicMatrix,
+        domain: Mapping[Any, Any],
         premises: Sequence[Premise] | None = None,
-        unknown: Collection[sp.Symbol] = (),
+        unknown: str | Collection[Name] = (),
     ) -> DescriptorSystem:
         """The system of nonlinear matrices E(x), A(x), B(x), C(x) over a domain.
 
+        Names are given as text or as symbols, with whatever assumptions: one name is one thing. Entries are
+        expressions, numbers or formulas as text (`quasilpv.systems.formula`).
+
         Args:
             name: identifier.
-            state: the symbols of x, differential states first.
+            state: names of x, differential states first.
             inputs: names of u.
-            E, A, B, C: n x n, n x n, n x m and o x n matrices of expressions.
-            domain: interval of every symbol the matrices depend on.
+            E, A, B, C: n x n, n x n, n x m and o x n matrices.
+            domain: by name, the interval (low, high) of everything the matrices depend on.
             premises: what the matrices are affine in. If they are not given they are found, as few as possible, with
                 bounds proved over the domain (`find_premises`).
             unknown: parameters unknown to the controller, for premises that are to be found.
 
+        Returns:
+            The system. A premise that depends on states which the outputs C x do not show is `PremiseKind.ESTIMATED`:
+            a law that has the whole state may use it, an observer may not.
+
         Raises:
             InputError: an entry is not ``a_0 + sum a_k z_k(x)`` with numbers a_k (entry and remainder are named), the
-                premises are linearly dependent (with each other or with a constant), or a found one is unbounded.
+                premises are linearly dependent (with each other or with a constant), a found one is unbounded, a name
+                is not declared or declared in vain, or an interval is none.
         """
+        bases = [premise.expression for premise in premises or ()]
+        names = Vocabulary(name, state, inputs, domain, unknown=unknown, declared=bases)
+        matrices = [_read(names, field, matrix) for field, matrix in zip("EABC", (E, A, B, C), strict=True)]
+        if premises is not None:
+            premises = [replace(p, expression=names.read(f"premise {p.name}", p.expression)) for p in premises]
+        names.finish()
+        return cls._of(names, matrices, premises)
+
+    @classmethod
+    def _of(
+        cls,
+        names: Vocabulary,
+        matrices: Sequence[sp.Matrix],
+        premises: Sequence[Premise] | None = None,
+        *,
+        state: Sequence[sp.Symbol] = (),
+        domain: Mapping[sp.Symbol, Bounds] | None = None,
+        disturbance: tuple[float, ...] = (),
+    ) -> DescriptorSystem:
+        """The system of matrices whose entries have been read; state and domain are those of the names by default."""
+        state, domain = state or names.state, names.domain if domain is None else domain
         if premises is None:
-            premises, matrices = find_premises((E, A, B, C), domain, unknown)
+            premises, affine = find_premises(matrices, domain, names.unknown)
         else:
-            basis = PremiseBasis(name, premises)
-            matrices = [basis.affine(*named) for named in (("E", E), ("A", A), ("B", B), ("C", C))]
-        affine = dict(zip("EABC", matrices, strict=True))
-        return cls(name, tuple(state), tuple(inputs), tuple(premises), **affine, domain=dict(domain))
+            basis = PremiseBasis(names.source, premises)
+            affine = [basis.affine(field, matrix) for field, matrix in zip("EABC", matrices, strict=True)]
+        return cls(
+            name=names.source,
+            state=tuple(state),
+            inputs=tuple(each.name for each in names.inputs),
+            premises=with_kinds(premises, state, affine[-1]),
+            **dict(zip("EABC", affine, strict=True)),
+            domain=dict(domain),
+            disturbance=disturbance,
+        )
 
     @classmethod
     def from_equations(
         cls,
-        equations: Sequence[sp.Expr | sp.Eq],
+        equations: Sequence[Formula],
         *,
-        name: str,
-        state: Sequence[sp.Symbol],
-        inputs: Sequence[sp.Symbol],
-        domain: Mapping[sp.Symbol, tuple[float, float]],
-        outputs: Sequence[sp.Expr] | None = None,
-        unknown: Collection[sp.Symbol] = (),
+        name: str = "system",
+        state: str | Sequence[Name],
+        inputs: str | Sequence[Name] = (),
+        domain: Mapping[Any, Any],
+        outputs: str | Sequence[Formula] | None = None,
+        unknown: str | Collection[Name] = (),
+        equilibrium: tuple[Any, Any] | None = None,
+        constants: Mapping[str, sp.Expr] | None = None,
     ) -> DescriptorSystem:
-        """The system of implicit equations ``F(x, x', u) = 0``, affine in x' and u, of which x = 0 is an equilibrium.
+        """The system of implicit equations ``F(x, x', u) = 0``, affine in x' and u, around an equilibrium.
 
         States whose rate occurs nowhere are algebraic and come last, in the order given otherwise, like the equations
-        without a rate. How the drift is written as A(x) x: see `factored`.
+        without a rate. How the drift is written as A(x) x: see `quasilpv.systems.factoring.split`. Names are given as
+        text or as symbols, with whatever assumptions: one name is one thing.
 
         Args:
-            equations: as many as states; an expression stands for itself = 0. ``rate(x1)`` is the symbol of x1'.
+            equations: as many as states; text such as ``"x1' = -sin(x2) + u"`` (`quasilpv.systems.formula`), an
+                equation or an expression, which stands for itself = 0. ``rate(x1)`` is the symbol of x1'.
             name: identifier.
-            state: the symbols of x, in any order.
-            inputs: the symbols of u.
-            domain: interval of every symbol the matrices depend on.
-            outputs: y, expressions of the state that vanish at 0; the whole state if not given.
+            state: names of x, in any order.
+            inputs: names of u.
+            domain: by name, the interval (low, high) of everything the matrices depend on, as it is in the equations.
+            outputs: y, expressions of the state; the whole state if not given.
             unknown: parameters unknown to the controller; their premises are of kind UNKNOWN.
+            equilibrium: ``(x0, u0)``, each values in order or by name; doubles are taken as the rationals they are.
+                State and inputs of the system are then the deviations from it, under the same names. The origin if not
+                given.
+            constants: by name, numbers that stand for that name in every formula.
+
+        Returns:
+            The system. What the equations leave over at the equilibrium, up to `equations.RESIDUAL` of the terms of a
+            row, is its `disturbance`. Kinds of premises: see `from_symbols`.
 
         Raises:
-            InputError: an equation is not affine in rates and inputs, has a drift that does not vanish at x = 0 or that
-                cannot be factored (the equation is named), there are not as many equations as states, or
-                `from_symbols` refuses the matrices.
+            InputError: an equation is not affine in rates and inputs, has a drift that does not vanish at the
+                equilibrium or that cannot be factored (the equation is named), there are not as many equations as
+                states, a text is no formula, or `from_symbols` refuses names, domain or matrices.
         """
-        matrices = equation_matrices(name, equations, state, inputs, state if outputs is None else outputs)
-        return cls.from_symbols(
-            name=name,
+        names = Vocabulary(name, state, inputs, domain, unknown=unknown, constants=constants)
+        around = Equilibrium.of(names, equilibrium)
+        shown = [each.name for each in names.state] if outputs is None else outputs
+        matrices = equation_matrices(names, equations, [shown] if isinstance(shown, str) else shown, around)
+        names.finish()
+        return cls._of(
+            names,
+            (matrices.E, matrices.A, matrices.B, matrices.C),
             state=matrices.state,
-            inputs=[symbol.name for symbol in inputs],
-            E=matrices.E,
-            A=matrices.A,
-            B=matrices.B,
-            C=matrices.C,
-            domain=domain,
-            unknown=unknown,
+            domain={each: _shifted(name, each, bounds, around) for each, bounds in names.domain.items()},
+            disturbance=matrices.d if any(matrices.d) else (),
         )
 
     def __repr__(self) -> str:
@@ -170,6 +226,10 @@ class DescriptorSystem:
             shown.append(f"  and {len(self.premises) - SHOWN_PREMISES} more premises")
         inputs = ", ".join(self.inputs) or "none"
         return "\n".join([f"{self.name}: {kinds} states {names}; inputs {inputs}", *shown])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The parts only: compiled functions of them do not travel between processes."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def order(self) -> int:
@@ -214,13 +274,14 @@ class DescriptorSystem:
         """The matrices at a premise vector z of shape (p,)."""
         return SystemMatrices(self.E.evaluate(z), self.A.evaluate(z), self.B.evaluate(z), self.C.evaluate(z))
 
-    def premise_values(self, x: ArrayLike, parameters: Mapping[sp.Symbol, float] | None = None) -> NDArray[np.float64]:
-        """z(x), shape (p,), at a state of shape (n,) and at values of the uncertain parameters, if there are any.
+    def premise_values(self, x: ArrayLike, parameters: Mapping[Any, float] | None = None) -> NDArray[np.float64]:
+        """z(x), shape (p,), at a state of shape (n,) and at values by name of the uncertain parameters.
 
         Raises:
             InputError: a premise depends on a parameter that has no value.
         """
-        parameters, values = parameters or {}, np.asarray(x, dtype=float)
+        parameters = {symbol(name): value for name, value in (parameters or {}).items()}
+        values = np.asarray(x, dtype=float)
         if values.shape != (self.order,):
             raise InputError(self.name, "x", f"shape {values.shape}", f"shape ({self.order},)")
         missing = [symbol.name for symbol in self.parameters if symbol not in parameters]
@@ -240,3 +301,38 @@ class DescriptorSystem:
     @cached_property
     def _premise_function(self) -> Any:
         return sp.lambdify((*self.state, *self.parameters), [p.expression for p in self.premises], "numpy")
+
+
+def _read(names: Vocabulary, field: str, matrix: SymbolicMatrix) -> sp.Matrix:
+    """A matrix in the symbols of the vocabulary."""
+    if isinstance(matrix, sp.MatrixBase):
+        shape, rows = matrix.shape, matrix.tolist()
+    else:
+        rows = [[*row] for row in matrix]
+        shape = (len(rows), len(rows[0]) if rows else 0)
+        if any(len(row) != shape[1] for row in rows):
+            raise InputError(names.source, field, "rows of different length", "a matrix")
+    entries = [names.read(f"{field}[{i},{j}]", entry) for i, row in enumerate(rows) for j, entry in enumerate(row)]
+    return sp.Matrix(*shape, entries)
+
+
+def _shifted(source: str, name: sp.Symbol, bounds: Bounds, around: Equilibrium) -> Bounds:
+    """The interval of the deviation from an equilibrium, rounded outward.
+
+    Raises:
+        InputError: the interval does not hold the equilibrium.
+    """
+    value = around.state.get(name, sp.S.Zero)
+    if value == 0:
+        return bounds
+    near = sp.Rational(value if value.is_Rational else sp.N(value, 60))
+    low, high = (bound if abs(bound) == inf else Fraction(bound) - Fraction(near.p, near.q) for bound in bounds)
+    if not low <= 0 <= high:
+        raise InputError(source, f"domain of {name}", bounds, f"an interval that holds the equilibrium {value}")
+    ends = (float(low), float(high))
+    if not value.is_Rational:  # a value such as pi is nearer than a double can say
+        return nextafter(ends[0], -inf), nextafter(ends[1], inf)
+    return (
+        ends[0] if abs(low) == inf or Fraction(ends[0]) <= low else nextafter(ends[0], -inf),
+        ends[1] if abs(high) == inf or Fraction(ends[1]) >= high else nextafter(ends[1], inf),
+    )

@@ -1,63 +1,115 @@
-"""Implicit equations ``F(x, x', u) = 0`` written as ``E(x) x' = A(x) x + B(x) u``.
+"""Implicit equations ``F(x, x', u) = 0`` written as ``E(x) x' = A(x) x + B(x) u + d``.
 
-E and B follow from the equations; A does not. Here every term of the drift is divided by one state, chosen by a fixed
-rule (`factored`), so the same equations always give the same matrices.
+E and B follow from the equations; A does not: see `quasilpv.systems.factoring`. d is what the equations leave over
+at the point that is taken for the equilibrium: rounding, or it is refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import sympy as sp
 
 from quasilpv.errors import InputError
-from quasilpv.systems.quotients import expm1_quotient, tanh_quotient
+from quasilpv.systems.factoring import expanded, split
+from quasilpv.systems.vocabulary import Formula, Vocabulary, exact, rate, symbol
 
-# f(w)/w of functions that vanish at 0, and functions that are 1 there as 1 plus a multiple of w.
-_QUOTIENTS = {sp.sin: sp.sinc, sp.tanh: tanh_quotient}
-_AROUND_ONE = {
-    sp.cos: lambda w: 1 - w**2 / 2 * sp.sinc(w / 2) ** 2,
-    sp.exp: lambda w: 1 + w * expm1_quotient(w),
-}
+__all__ = ["RESIDUAL", "EquationMatrices", "Equilibrium", "equation_matrices", "rate"]
+
+RESIDUAL = 1e-9
+"""Largest constant left over at an equilibrium, relative to the summed magnitudes of the terms of its equation."""
 
 
 class EquationMatrices(NamedTuple):
-    """What a set of equations says: the states in order, and E(x), A(x), B(x), C(x) as expressions."""
+    """What a set of equations says: the states in order, E(x), A(x), B(x), C(x) as expressions, and the constants d."""
 
     state: tuple[sp.Symbol, ...]
     E: sp.Matrix
     A: sp.Matrix
     B: sp.Matrix
     C: sp.Matrix
+    d: tuple[float, ...]
 
 
-def rate(state: sp.Symbol) -> sp.Symbol:
-    """The symbol that stands for the time derivative of a state in an equation."""
-    return sp.Symbol(f"{state.name}'", real=True)
+class Equilibrium(NamedTuple):
+    """The point around which a system is written down, by symbol of state and input; 0 for those not named."""
+
+    state: Mapping[sp.Symbol, sp.Expr]
+    inputs: Mapping[sp.Symbol, sp.Expr]
+
+    @classmethod
+    def of(cls, names: Vocabulary, given: tuple[Any, Any] | None) -> Equilibrium:
+        """From ``(x0, u0)``, each a sequence in order or a mapping by name; doubles are the rationals they are.
+
+        Raises:
+            InputError: not two parts, a wrong number of values, or a value that is no finite real number.
+        """
+        if given is None:
+            return cls({}, {})
+        try:
+            x0, u0 = given
+        except (TypeError, ValueError):
+            raise InputError(names.source, "equilibrium", given, "(x0, u0): values of states and inputs") from None
+        return cls(cls._values(names, "x0", names.state, x0), cls._values(names, "u0", names.inputs, u0))
+
+    @staticmethod
+    def _values(names: Vocabulary, field: str, symbols: Sequence[sp.Symbol], given: Any) -> dict[sp.Symbol, sp.Expr]:
+        source, field = names.source, f"equilibrium {field}"
+        if isinstance(given, Mapping):
+            values = {symbol(name): value for name, value in given.items()}
+            strangers = [name for name in values if name not in symbols]
+            if strangers:
+                raise InputError(source, field, strangers[0], f"one of {', '.join(map(str, symbols))}")
+        else:
+            listed = list(given)
+            if len(listed) != len(symbols):
+                raise InputError(source, field, f"{len(listed)} values", f"{len(symbols)}")
+            values = dict(zip(symbols, listed, strict=True))
+        return {name: _number(source, f"{field}, {name}", value) for name, value in values.items()}
+
+    def of_deviations(self, expression: sp.Expr) -> sp.Expr:
+        """An expression of the symbols as one of their deviations from here, which have the same names."""
+        shift = {name: name + value for name, value in {**self.state, **self.inputs}.items() if value != 0}
+        return expression.xreplace(shift) if shift else expression
+
+    def at(self, expression: sp.Expr, names: Vocabulary) -> sp.Expr:
+        """An expression here, states and inputs not named being 0."""
+        values = {name: sp.S.Zero for name in (*names.state, *names.inputs)}
+        return expression.subs({**values, **self.state, **self.inputs})
+
+
+def _number(source: str, field: str, value: Any) -> sp.Expr:
+    try:
+        number = exact(sp.sympify(value, strict=True))
+    except (sp.SympifyError, TypeError, ValueError):
+        number = None
+    if number is None or not (isinstance(number, sp.Expr) and number.is_number and number.is_real and number.is_finite):
+        raise InputError(source, field, value, "a finite number")
+    return number
 
 
 def equation_matrices(
-    source: str,
-    equations: Sequence[sp.Expr | sp.Eq],
-    state: Sequence[sp.Symbol],
-    inputs: Sequence[sp.Symbol],
-    outputs: Sequence[sp.Expr],
+    names: Vocabulary, equations: Sequence[Formula], outputs: Sequence[Formula], equilibrium: Equilibrium
 ) -> EquationMatrices:
-    """Matrices of the equations ``F(x, x', u) = 0`` and of the outputs ``y = h(x)``.
+    """Matrices of the equations ``F(x, x', u) = 0`` and of the outputs ``y = h(x)`` around an equilibrium.
 
     Equations without a rate, and states whose rate occurs nowhere, are moved behind the others.
 
     Raises:
         InputError: see `DescriptorSystem.from_equations`.
     """
+    source, state, inputs = names.source, names.state, names.inputs
     if len(equations) != len(state):
         raise InputError(source, "equations", f"{len(equations)} equations", f"{len(state)}, one for each state")
-    residuals = [e.lhs - e.rhs if isinstance(e, sp.Eq) else sp.sympify(e) for e in equations]
-    for number, residual in enumerate(residuals, 1):
-        if not isinstance(residual, sp.Expr):  # sympy evaluates an equation without unknowns to true or false
-            raise InputError(source, f"equation {number}", residual, "an expression or an equation with unknowns")
-    rates = [rate(symbol) for symbol in state]
+    residuals = [
+        equilibrium.of_deviations(exact(names.read(f"equation {number}", equation, rates=True, inputs=True)))
+        for number, equation in enumerate(equations, 1)
+    ]
+    rates = [rate(name) for name in state]
+    if not any(residual.has(*rates) for residual in residuals):
+        expected = "a rate, x' or rate(x): x.diff(t) of a symbol x is 0"
+        raise InputError(source, "equations", "no rate of a state", expected)
     E = sp.Matrix([_slopes(f"{source}: equation {k}", r, rates, inputs) for k, r in enumerate(residuals, 1)])
     B = -sp.Matrix([_slopes(f"{source}: equation {k}", r, inputs, rates) for k, r in enumerate(residuals, 1)])
     B = B.reshape(len(residuals), len(inputs))
@@ -66,84 +118,51 @@ def equation_matrices(
     ordered = [state[column] for column in columns]
     algebraic = [state[column] for column in columns if E[:, column].is_zero_matrix]
     at_rest = dict.fromkeys([*rates, *inputs], 0)
-    drift = [
-        factored(f"{source}: equation {row + 1}", -residuals[row].subs(at_rest), ordered, algebraic) for row in rows
-    ]
-    measured = [factored(f"{source}: output {k}", sp.sympify(h), ordered, algebraic) for k, h in enumerate(outputs, 1)]
+    drift, constants = [], []
+    for row in rows:
+        field = f"{source}: equation {row + 1}"
+        constant, entries = split(field, -residuals[row].subs(at_rest), ordered, algebraic)
+        drift.append(entries)
+        constants.append(_left_over(field, constant, -residuals[row].subs(at_rest), state))
+    measured = []
+    for number, output in enumerate(outputs, 1):
+        whole = exact(names.read(f"output {number}", output))
+        deviation = equilibrium.of_deviations(whole) - (equilibrium.at(whole, names) if equilibrium.state else 0)
+        constant, entries = split(f"{source}: output {number}", deviation, ordered, algebraic)
+        if constant != 0:
+            expected = "0: an output is a deviation from its value at the equilibrium"
+            raise InputError(f"{source}: output {number}", "value at x = 0", constant, expected)
+        measured.append(entries)
     return EquationMatrices(
         tuple(ordered),
         E.extract(rows, columns),
         sp.Matrix(drift),
         B.extract(rows, list(range(B.cols))),
-        sp.Matrix(measured),
+        sp.Matrix(measured).reshape(len(measured), len(ordered)),
+        tuple(constants),
     )
+
+
+def _left_over(field: str, constant: sp.Expr, drift: sp.Expr, state: Sequence[sp.Symbol]) -> float:
+    """The constant of an equation at the equilibrium if it is rounding, which is reported as a disturbance.
+
+    Raises:
+        InputError: it is more than `RESIDUAL` of the row, or depends on a parameter.
+    """
+    if constant == 0:
+        return 0.0
+    at_zero = dict.fromkeys(state, 0)
+    size = sum((sp.Abs(sp.N(term.subs(at_zero))) for term in expanded(drift)), sp.S.Zero)
+    if constant.is_number and size.is_number and abs(sp.N(constant)) <= RESIDUAL * size:
+        return float(constant)
+    expected = "0: give the equilibrium, equilibrium=(x0, u0), or make it an input"
+    raise InputError(field, "drift at x = 0", sp.N(constant, 6) if constant.is_number else constant, expected)
 
 
 def _slopes(source: str, residual: sp.Expr, along: Sequence[sp.Symbol], others: Sequence[sp.Symbol]) -> list[sp.Expr]:
     """Coefficients of some symbols in a residual that must be affine in them and in the others together."""
-    slopes = [sp.expand(sp.diff(residual, symbol)) for symbol in along]
-    for symbol, slope in zip(along, slopes, strict=True):
+    slopes = [sp.expand(sp.diff(residual, name)) for name in along]
+    for name, slope in zip(along, slopes, strict=True):
         if slope.free_symbols & {*along, *others}:
-            raise InputError(source, f"coefficient of {symbol}", slope, "a function of the state alone")
+            raise InputError(source, f"coefficient of {name}", slope, "a function of the state alone")
     return slopes
-
-
-def factored(
-    source: str, expression: sp.Expr, state: Sequence[sp.Symbol], algebraic: Sequence[sp.Symbol] = ()
-) -> list[sp.Expr]:
-    """A row a(x) with ``expression = sum_j a_j(x) x_j``.
-
-    The expression is expanded and every term divided by one state:
-
-    * a product of powers of states by the last algebraic state in it, so that premises depend on differential states if
-      they can (Assumption 1), otherwise by the last state in it: ``x1 x2^2 = (x1 x2) x2``, ``x^3 = (x^2) x``;
-    * a term without such a state by the argument of its first sine or tanh: ``sin w = sinc(w) w``, w factored in its
-      turn, ``tanh w = tanh_quotient(w) w``;
-    * in terms left over, ``cos w = 1 - (w/2) sinc(w/2)^2 w`` and ``e^w = 1 + expm1_quotient(w) w``: so
-      ``1 - cos x = (x/2) sinc(x/2)^2 x``.
-
-    Raises:
-        InputError: the expression does not vanish at x = 0, or a term is none of these.
-    """
-    constant = sp.simplify(expression.subs(dict.fromkeys(state, 0)))
-    if constant != 0:
-        raise InputError(source, "drift at x = 0", constant, "0: take the equilibrium as origin, or make it an input")
-    row = dict.fromkeys(state, sp.S.Zero)
-    left_over = _share_out(source, expression, row, algebraic)
-    for function, around_one in _AROUND_ONE.items():
-        left_over = left_over.replace(function, around_one)
-    refused = _share_out(source, left_over, row, algebraic)
-    if refused != 0:
-        raise InputError(source, "drift", refused, "terms with a factor x, sin w, tanh w, 1 - cos w or e^w - 1")
-    return [row[symbol] for symbol in state]
-
-
-def _share_out(
-    source: str, expression: sp.Expr, row: dict[sp.Symbol, sp.Expr], algebraic: Sequence[sp.Symbol]
-) -> sp.Expr:
-    """Add to the row the quotients of all terms that can be divided by a state, and return the sum of the others."""
-    left_over = sp.S.Zero
-    for term in sp.Add.make_args(sp.expand(expression)):
-        quotients = _divided(source, term, list(row), algebraic)
-        left_over += sp.S.Zero if quotients else term
-        for symbol, quotient in quotients.items():
-            row[symbol] += quotient
-    return left_over
-
-
-def _divided(
-    source: str, term: sp.Expr, state: Sequence[sp.Symbol], algebraic: Sequence[sp.Symbol]
-) -> dict[sp.Symbol, sp.Expr]:
-    """Quotients of a term by states, none if it has no factor that is a state, a sine or a tanh."""
-    powers = term.as_powers_dict()
-    plain = [symbol for symbol in state if powers.get(symbol, sp.S.Zero).is_positive and powers[symbol] >= 1]
-    for candidates in ([s for s in plain if s in algebraic], plain):
-        if candidates:
-            return {candidates[-1]: term / candidates[-1]}
-    for base in sorted(powers, key=sp.default_sort_key):
-        if base.func in _QUOTIENTS and powers[base] >= 1:
-            (argument,) = base.args
-            row = factored(source, argument, state, algebraic)
-            quotient = term / base * _QUOTIENTS[base.func](argument)
-            return {symbol: quotient * part for symbol, part in zip(state, row, strict=True) if part != 0}
-    return {}

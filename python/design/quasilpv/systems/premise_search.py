@@ -41,7 +41,7 @@ def find_premises(
     Raises:
         InputError: a premise has no bounds over the domain (`enclose` says why).
     """
-    entries = [[expansion(sp.sympify(entry)) for entry in matrix] for matrix in matrices]
+    entries = [[expansion(entry) for entry in matrix] for matrix in matrices]
     terms = list(dict.fromkeys(term for numbers in _flat(entries) for term in numbers if term != 1))
     relations = _proved_relations(terms, domain)
     entries = [[_rewritten(numbers, relations) for numbers in matrix] for matrix in entries]

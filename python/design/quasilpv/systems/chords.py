@@ -1,0 +1,192 @@
+"""Chords ``(g(a + w) - g(a))/w`` of functions: what is left of a function when a state is factored out around a point.
+
+``sin w = sinc(w) w`` has its quotient in sympy; for other functions, and around a point other than 0, the quotient is a
+function of two arguments here: ``log(2 + x) - log 2 = log_chord(2, x) x``. At w = 0 it is the slope g'(a); of a
+function with a corner there it is the mean of both slopes, which is one of the values that satisfy the identity.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+_SMALL = 1e-5  # below it the slope in the middle of a chord is nearer to its mean than the rounded quotient
+
+
+class Ramp(sp.Function):  # type: ignore[misc]  # sympy carries no annotations
+    """``max(w, 0)``, of which all maxima and minima are made: ``max(v, b) = b + ramp(v - b)``."""
+
+    nargs = 1
+
+    @classmethod
+    def eval(cls, w: sp.Expr) -> sp.Expr | None:
+        """Of numbers, and of what is known to have a sign."""
+        if w.is_nonnegative:
+            return w
+        return sp.S.Zero if w.is_nonpositive else None
+
+    @staticmethod
+    def _imp_(w: ArrayLike) -> Array:
+        return np.asarray(np.maximum(np.asarray(w, dtype=float), 0.0))
+
+
+class Chord(sp.Function):  # type: ignore[misc]
+    """``(g(a + w) - g(a))/w``; subclasses name g. `_imp_` is what `sympy.lambdify` and `evalf` call."""
+
+    nargs = 2
+    smoothness = ""
+    """Name of g among the functions whose derivatives are enclosed, `interval_elementary.SMOOTHNESS`."""
+
+
+class log_chord(Chord):  # noqa: N801 -- spelt like the function
+    """Of the natural logarithm."""
+
+    smoothness = "log"
+
+    @staticmethod
+    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+        a, w = _arrays(a, w)
+        return _quotient(np.log1p(w / a), w, 1 / a)
+
+
+class tan_chord(Chord):  # noqa: N801
+    """Of tan: ``tan b - tan a = sin(b - a)/(cos a cos b)``."""
+
+    smoothness = "tan"
+
+    @staticmethod
+    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+        a, w = _arrays(a, w)
+        return np.asarray(np.sinc(w / np.pi) / (np.cos(a) * np.cos(a + w)))
+
+
+class atan_chord(Chord):  # noqa: N801
+    """Of atan."""
+
+    smoothness = "atan"
+
+    @staticmethod
+    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+        a, w = _arrays(a, w)
+        return _stable(np.arctan, lambda x: 1 / (1 + x**2), a, w)
+
+
+class asin_chord(Chord):  # noqa: N801
+    """Of asin."""
+
+    smoothness = "asin"
+
+    @staticmethod
+    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+        a, w = _arrays(a, w)
+        return _stable(np.arcsin, lambda x: 1 / np.sqrt(1 - x**2), a, w)
+
+
+class sinh_chord(Chord):  # noqa: N801
+    """Of sinh: ``sinh b - sinh a = 2 sinh((b - a)/2) cosh((a + b)/2)``."""
+
+    smoothness = "sinh"
+
+    @staticmethod
+    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+        a, w = _arrays(a, w)
+        return np.asarray(_quotient(2 * np.sinh(w / 2), w, 1.0) * np.cosh(a + w / 2))
+
+
+class cosh_chord(Chord):  # noqa: N801
+    """Of cosh: ``cosh b - cosh a = 2 sinh((b - a)/2) sinh((a + b)/2)``."""
+
+    smoothness = "cosh"
+
+    @staticmethod
+    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+        a, w = _arrays(a, w)
+        return np.asarray(_quotient(2 * np.sinh(w / 2), w, 1.0) * np.sinh(a + w / 2))
+
+
+class tanh_chord(Chord):  # noqa: N801
+    """Of tanh: ``tanh b - tanh a = tanh(b - a) (1 - tanh a tanh b)``."""
+
+    smoothness = "tanh"
+
+    @staticmethod
+    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+        a, w = _arrays(a, w)
+        return np.asarray(_quotient(np.tanh(w), w, 1.0) * (1 - np.tanh(a) * np.tanh(a + w)))
+
+
+class sinc_chord(Chord):  # noqa: N801
+    """Of sinc(w) = sin(w)/w."""
+
+    smoothness = "sinc"
+
+    @staticmethod
+    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+        a, w = _arrays(a, w)
+        return _stable(lambda x: np.sinc(x / np.pi), _sinc_slope, a, w)
+
+
+class abs_chord(Chord):  # noqa: N801
+    """Of the absolute value: in [-1, 1]; around 0 it is the sign of w."""
+
+    smoothness = "abs"
+
+    @staticmethod
+    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+        a, w = _arrays(a, w)
+        return np.asarray(2 * ramp_chord._imp_(a, w) - 1)
+
+
+class ramp_chord(Chord):  # noqa: N801
+    """Of max(w, 0): in [0, 1]."""
+
+    smoothness = "ramp"
+
+    @staticmethod
+    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+        a, w = _arrays(a, w)
+        b = a + w
+        across = _quotient(np.maximum(a, b), np.abs(w), 0.5)
+        return np.select([(a == 0) & (w == 0), np.minimum(a, b) >= 0, np.maximum(a, b) <= 0], [0.5, 1.0, 0.0], across)
+
+
+CHORDS: dict[Any, type[Chord]] = {
+    sp.log: log_chord,
+    sp.tan: tan_chord,
+    sp.atan: atan_chord,
+    sp.asin: asin_chord,
+    sp.sinh: sinh_chord,
+    sp.cosh: cosh_chord,
+    sp.tanh: tanh_chord,
+    sp.sinc: sinc_chord,
+    sp.Abs: abs_chord,
+    Ramp: ramp_chord,
+}
+"""The chord of every function that is factored by one."""
+
+
+def _arrays(a: ArrayLike, w: ArrayLike) -> tuple[Array, Array]:
+    one, other = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(w, dtype=float))
+    return one, other
+
+
+def _quotient(difference: ArrayLike, w: Array, at_zero: ArrayLike) -> Array:
+    """The quotient, or its limit."""
+    return np.asarray(np.where(w == 0, at_zero, difference / np.where(w == 0, 1.0, w)))
+
+
+def _stable(function: Any, slope: Any, a: Array, w: Array) -> Array:
+    """The quotient of rounded values, or the slope in the middle."""
+    small = np.abs(w) < _SMALL
+    return np.asarray(np.where(small, slope(a + w / 2), (function(a + w) - function(a)) / np.where(small, 1.0, w)))
+
+
+def _sinc_slope(x: Array) -> Array:
+    small = np.abs(x) < 1e-2
+    safe = np.where(small, 1.0, x)
+    return np.asarray(np.where(small, -x / 3 + x**3 / 30 - x**5 / 840, (np.cos(x) - np.sinc(x / np.pi)) / safe))
