@@ -76,10 +76,36 @@ def test_determinant_that_is_not_multi_affine_is_enclosed() -> None:
     assert not beyond.leading.holds
 
 
-def test_when_a_premise_depends_on_an_algebraic_state_expect_assumption_1_not_proved() -> None:
-    report = structure_report(toy(sp.diag(1, 0), sp.Matrix([[y**2, 1], [1, 2]])))
-    assert report.verdict is StructureVerdict.NOT_PROVED
-    assert report.assumption_1.reason == "z1 depends on the algebraic state y"
+def algebraic(*equations: str, state: str = "x w", reach: float = 1.2) -> DescriptorSystem:
+    names = state.split()
+    return DescriptorSystem.from_equations(
+        ["x' = -x + u", *equations], state=state, inputs="u", domain={name: (-reach, reach) for name in names}
+    )
+
+
+@pytest.mark.parametrize(
+    ("model", "standing"),
+    [
+        (algebraic("0 = x - (w - 2/5*w**3)"), Standing.REFUTED),  # folds at 0.91, although 1 - 2/5 w^2 > 0
+        (algebraic("0 = x - (w - 2/5*w**3)", reach=0.9), Standing.PROVED_OVER_DOMAIN),
+        (algebraic("0 = x - (w + 2/5*w**3)"), Standing.PROVED_OVER_DOMAIN),  # increases
+        (algebraic("0 = 3*x - sin(2*w)"), Standing.REFUTED),  # at w = pi/4
+        (algebraic("0 = 3*x - tan(w)"), Standing.PROVED_OVER_DOMAIN),
+        (algebraic("0 = x - w*exp(-w)"), Standing.REFUTED),  # at w = 1
+        (algebraic("0 = x + u - w - w**3"), Standing.NOT_PROVED),  # then w depends on the input
+        (algebraic("0 = x - w - w*abs(w)"), Standing.NOT_PROVED),  # a corner
+        (algebraic("0 = x - w - y**2/9", "0 = x - y + w**2/9", state="x w y"), Standing.PROVED_OVER_DOMAIN),
+        (algebraic("0 = x - w - y**2", "0 = x - y + w**2", state="x w y"), Standing.NOT_PROVED),  # det = 1 + 4 w y
+    ],
+)
+def test_premises_of_algebraic_states_are_allowed_where_those_follow_from_the_others(
+    model: DescriptorSystem, standing: Standing
+) -> None:
+    report = structure_report(model)
+    assert report.assumption_1.standing is standing
+    assert report.assumption_1.reason.startswith("z1 ")
+    expected = StructureVerdict.INDEX_ONE if standing is Standing.PROVED_OVER_DOMAIN else StructureVerdict.NOT_PROVED
+    assert report.verdict is expected
 
 
 @pytest.mark.parametrize(("radicand", "holds"), [(1 + x**2, True), (1 + x, False)])

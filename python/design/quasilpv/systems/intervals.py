@@ -93,7 +93,7 @@ def enclose(
     expression, domain = in_one_variable(expression, domain)
     symbols = sorted(expression.free_symbols, key=lambda symbol: symbol.name)
     box = tuple((float(domain[symbol][0]), float(domain[symbol][1])) for symbol in symbols)
-    function = _IntervalFunction(expression, symbols)
+    function = IntervalFunction(expression, symbols)
     whole = function.value(box)
     if not (isfinite(_lower(whole)) and isfinite(_upper(whole))):
         raise InputError("expression", str(expression), f"range [{_lower(whole)}, {_upper(whole)}]", "a bounded range")
@@ -101,7 +101,7 @@ def enclose(
     if _every_symbol_occurs_once(expression) and not (bounded and any(not _exact(c) for c in expression.atoms(Chord))):
         return _lower(whole), _upper(whole)
     minimum = _lower_bound_of_minimum(function, box, tolerance)
-    maximum = -_lower_bound_of_minimum(_IntervalFunction(-expression, symbols), box, tolerance)
+    maximum = -_lower_bound_of_minimum(IntervalFunction(-expression, symbols), box, tolerance)
     return max(minimum, _lower(whole)) + 0.0, min(maximum, _upper(whole)) + 0.0
 
 
@@ -127,7 +127,7 @@ def in_one_variable(
     if any(form != [ratio * slope for slope in forms[0]] for form, ratio in zip(forms, ratios, strict=True)):
         return expression, domain
     form = sp.Add(*(slope * symbol for slope, symbol in zip(forms[0], symbols, strict=True)))
-    range_of_form = _IntervalFunction(form, symbols).value(tuple(domain[symbol] for symbol in symbols))
+    range_of_form = IntervalFunction(form, symbols).value(tuple(domain[symbol] for symbol in symbols))
     one = sp.Dummy("form", real=True)
     moved = {
         node: sp.expand(node).subs(dict.fromkeys(symbols, 0)) + ratio * one
@@ -153,7 +153,7 @@ def _every_symbol_occurs_once(expression: sp.Expr) -> bool:
 # ---- branch and bound ------------------------------------------------------------------------------------------------
 
 
-def _lower_bound_of_minimum(function: _IntervalFunction, box: Box, tolerance: float) -> float:
+def _lower_bound_of_minimum(function: IntervalFunction, box: Box, tolerance: float) -> float:
     """A guaranteed lower bound of the minimum, within the tolerance of it (best first, Skelboe's algorithm)."""
     tie_break = count()
     bound, box, split = _bound_and_shrink(function, box)
@@ -164,14 +164,14 @@ def _lower_bound_of_minimum(function: _IntervalFunction, box: Box, tolerance: fl
         if reachable - bound <= tolerance * max(1.0, abs(reachable)) or split is None:
             break
         heapq.heappop(heap)
-        for half in _halves(box, split):
+        for half in halves(box, split):
             child_bound, child, child_split = _bound_and_shrink(function, half)
             reachable = min(reachable, _upper(function.value(_midpoint(child))))
             heapq.heappush(heap, (max(bound, child_bound), next(tie_break), child, child_split))
     return heap[0][0]
 
 
-def _bound_and_shrink(function: _IntervalFunction, box: Box) -> tuple[float, Box, int | None]:
+def _bound_and_shrink(function: IntervalFunction, box: Box) -> tuple[float, Box, int | None]:
     """Lower bound over the box, the face that holds its minimum, and the axis to split (None: it is a point)."""
     value, gradient = function.value_and_gradient(box)
     bound = _lower(value)
@@ -206,7 +206,8 @@ def _midpoint(box: Box) -> Box:
     return tuple((0.5 * low + 0.5 * high,) * 2 for low, high in box)
 
 
-def _halves(box: Box, axis: int) -> tuple[Box, Box]:
+def halves(box: Box, axis: int) -> tuple[Box, Box]:
+    """A box cut in the middle of one axis."""
     low, high = box[axis]
     middle = 0.5 * low + 0.5 * high
     return (
@@ -218,10 +219,11 @@ def _halves(box: Box, axis: int) -> tuple[Box, Box]:
 # ---- interval evaluation ---------------------------------------------------------------------------------------------
 
 
-class _IntervalFunction:
+class IntervalFunction:
     """A sympy expression evaluated on boxes, with its gradient."""
 
     def __init__(self, expression: sp.Expr, symbols: Sequence[sp.Symbol]) -> None:
+        """Take an expression, and the symbols in the order of the axes of a box."""
         self._nodes: list[sp.Basic] = list(dict.fromkeys(sp.postorder_traversal(expression)))
         self._symbols = {symbol: axis for axis, symbol in enumerate(symbols)}
         self._root = expression
@@ -229,9 +231,11 @@ class _IntervalFunction:
         self._constants = {node: _number(node) for node in self._nodes if node.is_number}
 
     def value(self, box: Box) -> IntervalValue:
+        """A range that holds every value on a box."""
         return self._evaluate(box, with_gradient=False)[0]
 
     def value_and_gradient(self, box: Box) -> tuple[IntervalValue, list[IntervalValue]]:
+        """Ranges that hold every value and every partial derivative on a box."""
         return self._evaluate(box, with_gradient=True)
 
     def _evaluate(self, box: Box, with_gradient: bool) -> tuple[IntervalValue, list[IntervalValue]]:

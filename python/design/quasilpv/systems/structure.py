@@ -1,5 +1,8 @@
 """What can be proved of the structure of a descriptor system: Assumption 1, an invertible E_1, index one.
 
+`structure_report` is the function to call; of its findings, `Finding.holds` and `Finding.standing` are what a condition
+that relies on the structure looks at.
+
 Dehak 2022, section I.4.1: with ``E = diag(E_1, 0)`` and ``A = [A_11, A_12; A_21, A_22]``, if the premises depend on the
 differential states alone (Assumption 1) and ``det A_22(z) != 0``, the algebraic states follow from the others as
 ``x_a = -A_22^-1 A_21 x_d`` (u = 0): the system has index one.
@@ -18,6 +21,8 @@ from numpy.typing import NDArray
 from sympy.polys.matrices import DomainMatrix
 
 from quasilpv.errors import InputError
+from quasilpv.systems.algebraic import follows
+from quasilpv.systems.chords import Ramp, abs_chord, ramp_chord
 from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.intervals import enclose
 from quasilpv.systems.premise import AffineMatrix
@@ -25,6 +30,7 @@ from quasilpv.systems.premise import AffineMatrix
 Interval = tuple[float, float]
 
 _MAX_CORNERS_OF = 12  # premises
+_CORNERS = (abs_chord, ramp_chord, Ramp, sp.Abs, sp.Max, sp.Min, sp.sign)
 _SIGN_TOLERANCES = (0.1, 1e-3)  # of a determinant relative to its size at the centre of the box, coarse first
 
 
@@ -33,7 +39,7 @@ class Standing(StrEnum):
 
     PROVED = "proved"
     PROVED_OVER_DOMAIN = "proved over the operating domain, not over the box of premises"
-    REFUTED = "refuted over the box of premises"
+    REFUTED = "refuted"
     NOT_PROVED = "not proved"
 
 
@@ -65,7 +71,9 @@ class StructureReport:
     Attributes:
         name: of the system.
         differential, algebraic: numbers q and s of differential and algebraic states.
-        assumption_1: the premises are differentiable functions of the differential states (and of outside parameters).
+        assumption_1: the premises are differentiable functions of the differential states (and of outside parameters),
+            also through algebraic states that follow from them (`quasilpv.systems.algebraic`). Refuted where an
+            algebraic equation folds: there the algebraic states do not follow, whatever A_22(z) says.
         leading: E_1(z) is invertible.
         algebraic_pivot: A_22(z) is invertible; trivially so if s = 0.
     """
@@ -115,15 +123,19 @@ def structure_report(system: DescriptorSystem) -> StructureReport:
 def _assumption_1(system: DescriptorSystem) -> Finding:
     algebraic = set(system.state[system.differential :])
     for premise in system.premises:
-        shared = sorted(symbol.name for symbol in premise.expression.free_symbols & algebraic)
-        if shared:
-            names = ", ".join(shared)
-            return Finding(Standing.NOT_PROVED, f"{premise.name} depends on the algebraic state {names}")
         for root in premise.expression.atoms(sp.Pow):
-            if root.exp == sp.Rational(1, 2) and not _proved_positive(root.base, system.domain):
+            if root.exp.is_Rational and 0 < root.exp < 1 and not _proved_positive(root.base, system.domain):
                 return Finding(Standing.NOT_PROVED, f"{premise.name} is not differentiable where {root.base} = 0")
+        if algebraic and premise.expression.has(*_CORNERS):
+            return Finding(Standing.NOT_PROVED, f"{premise.name} has a corner")
     if not algebraic:
         return Finding(Standing.PROVED, "there are no algebraic states")
+    through = [premise for premise in system.premises if premise.expression.free_symbols & algebraic]
+    if through:
+        holds, reason = follows(system)
+        standing = {True: Standing.PROVED_OVER_DOMAIN, False: Standing.REFUTED, None: Standing.NOT_PROVED}[holds]
+        names = ", ".join(sorted({s.name for premise in through for s in premise.expression.free_symbols & algebraic}))
+        return Finding(standing, f"{through[0].name} depends on the algebraic state {names}; {reason}")
     return Finding(Standing.PROVED, "every premise is a smooth function of the differential states or a parameter")
 
 
