@@ -184,6 +184,8 @@ def test_equilibrium_shifts_exactly_and_what_is_left_is_reported() -> None:
     expected = sp.Rational(float(np.sqrt(0.3))) - sp.sqrt(sp.Rational(0.3))
     assert left == pytest.approx(float(sp.N(expected, 30)), rel=1e-6)
     assert 0 < abs(left) < 1e-15
+    assert "constant disturbance of at most" in repr(rounded)
+    assert "disturbance" not in repr(exact)
     with pytest.raises(InputError, match="tank: equation 1: drift at x = 0"):
         DescriptorSystem.from_equations(equations, **tank, equilibrium=({"h": 0.3}, {"q": 0.5477}))
     with pytest.raises(InputError, match="an interval that holds the equilibrium"):

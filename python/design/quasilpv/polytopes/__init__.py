@@ -16,6 +16,7 @@ points of Dehak 2022, Theorem I.4 for a *simplex* block (weights affine in the o
 | `BlockPolytope.per_premise`: Dehak 2022, (II.6)-(II.10) | r boxes of one premise | 2 r |
 | `BlockPolytope.uncertain`: Dehak 2022, (III.3)-(III.9) | r + l boxes of one premise, l of them unknown | 2 (r + l) |
 | `BlockPolytope.reduced_affine`: Dehak 2022, Lemma I.6 and Theorem I.4 | one simplex | r + 1 |
+| `BlockPolytope.of_rules`: Takagi-Sugeno models given as rules | one of memberships | one per rule |
 | `BlockPolytope.grouped`: any partition | boxes of chosen size | sum of 2^size |
 
 Vertex order: blocks in order; inside a box block the first listed premise is the most significant bit and bit 0 means

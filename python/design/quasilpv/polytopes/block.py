@@ -15,11 +15,13 @@ class Block:
     """A group of premises with vertices of its own.
 
     Attributes:
-        kind: ``"box"`` (2^g vertices) or ``"simplex"`` (g + 1 vertices).
+        kind: ``"box"`` (2^g vertices), ``"simplex"`` around the box (g + 1 vertices) or ``"memberships"`` (g + 1
+            vertices): the part of the box where the sector coordinates sum to at most 1, for premises that are the
+            weights of all rules of a Takagi-Sugeno model but one.
         premises: indices of its premises, in the order of the vertex bits.
     """
 
-    kind: Literal["box", "simplex"]
+    kind: Literal["box", "simplex", "memberships"]
     premises: tuple[int, ...]
 
     @property
@@ -32,6 +34,8 @@ class Block:
         g = len(self.premises)
         if self.kind == "box":
             return np.array(list(product((0.0, 1.0), repeat=g))).reshape(self.vertices, g)
+        if self.kind == "memberships":
+            return np.vstack([np.eye(g), np.zeros((1, g))])
         # Corners 1, 2, 3, 7, ... of Lemma I.6: all lower; only the first premise upper; premises 2 ... k upper.
         corners = np.zeros((g + 1, g))
         corners[1, 0] = 1.0
@@ -45,6 +49,8 @@ class Block:
     def weights(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
         """Barycentric weights, summing to 1, of sector coordinates (..., g): shape (..., vertices)."""
         g = len(self.premises)
+        if self.kind == "memberships":
+            return np.concatenate((omega, 1.0 - omega.sum(axis=-1, keepdims=True)), axis=-1)
         if self.kind == "simplex":
             if g == 1:
                 return np.concatenate((1.0 - omega, omega), axis=-1)

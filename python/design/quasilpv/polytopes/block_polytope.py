@@ -131,6 +131,26 @@ class BlockPolytope:
         r = np.size(lower)
         return cls.from_blocks(lower, upper, [Block("simplex" if r else "box", tuple(range(r)))], unknown=unknown)
 
+    @classmethod
+    def of_rules(cls, lower: ArrayLike, upper: ArrayLike, *, unknown: Sequence[int] = ()) -> BlockPolytope:
+        """The memberships of all rules but the last as one block, a vertex per rule (centring has no effect).
+
+        Valid for premises whose sector coordinates sum to at most 1, which the box does not say.
+        """
+        r = np.size(lower)
+        return cls.from_blocks(lower, upper, [Block("memberships" if r else "box", tuple(range(r)))], unknown=unknown)
+
+    def holds(self, z: Sequence[Fraction]) -> bool:
+        """Whether a point of the box is one the vertices are made for, exactly: memberships leave some out."""
+        for block in self.blocks:
+            if block.kind == "memberships":
+                low = [Fraction(self.lower[p]) for p in block.premises]
+                high = [Fraction(self.upper[p]) for p in block.premises]
+                sector = [(z[p] - a) / (b - a) for p, a, b in zip(block.premises, low, high, strict=True)]
+                if min(sector) < 0 or sum(sector) > 1:
+                    return False
+        return True
+
     def restricted(self, premises: Sequence[int]) -> BlockPolytope:
         """The same blocks on some of the premises, in ascending order; blocks that lose all of theirs are left out."""
         kept = sorted(premises)
@@ -175,14 +195,14 @@ class BlockPolytope:
     def shared_gain(self) -> tuple[int, ...]:
         """For every vertex, the first vertex whose gain it must share, (N,).
 
-        Vertices of a box block that differ only in unknown premises must have equal gains, all vertices of a simplex
+        Vertices of a box block that differ only in unknown premises must have equal gains, all vertices of another
         block with an unknown premise must: then the gain ``sum w_i(z) K_i`` does not depend on what is unknown.
         """
         first: dict[tuple[Any, ...], int] = {}
         representative = []
         for vertex, corner in enumerate(chain.from_iterable(block.corners() for block in self.blocks)):
             block = self._block(vertex)
-            if block.kind == "simplex":
+            if block.kind != "box":
                 seen: tuple[Any, ...] = () if self.unknown & set(block.premises) else tuple(corner)
             else:
                 seen = tuple(c for c, p in zip(corner, block.premises, strict=True) if p not in self.unknown)
@@ -311,7 +331,7 @@ class BlockPolytope:
         """Monomials of one block, whose weights here sum to 1."""
         g = len(block.premises)
         width = self.upper - self.lower
-        if block.kind == "simplex":
+        if block.kind != "box":
             at_lower = np.tensordot(block.weights(np.zeros(g)), X, axes=1)
             slopes = [
                 (np.tensordot(block.weights(unit), X, axes=1) - at_lower) / width[p]

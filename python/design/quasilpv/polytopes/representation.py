@@ -9,7 +9,7 @@ from quasilpv.polytopes.block_polytope import BlockPolytope
 from quasilpv.polytopes.model import PolytopicModel, unknown_premises
 from quasilpv.systems.descriptor import DescriptorSystem
 
-REPRESENTATIONS = ("ts", "reduced", "per-premise", "uncertain", "grouped=0,1+2")
+REPRESENTATIONS = ("ts", "rules", "reduced", "per-premise", "uncertain", "grouped=0,1+2")
 """Forms of a representation's name; numbers are premises, ``+`` joins a group, ``,`` separates groups."""
 
 AT_ZERO = "@0"
@@ -19,7 +19,8 @@ AT_ZERO = "@0"
 def polytopic_model(system: DescriptorSystem, representation: str) -> PolytopicModel:
     """A system in the representation of that name.
 
-    * ``ts``: one box of all r premises, 2^r vertices
+    * ``ts``: one box of all r premises, 2^r vertices; of a system given by rules the same as ``rules``
+    * ``rules``: of a system given by rules (`DescriptorSystem.from_rules`), one vertex per rule
     * ``reduced``: one simplex, r + 1 vertices
     * ``per-premise``: a box per premise, 2 r vertices
     * ``uncertain``: the same, for a system with unknown premises
@@ -43,6 +44,10 @@ def polytopic_model(system: DescriptorSystem, representation: str) -> PolytopicM
         polytope = BlockPolytope.grouped(low, high, _partition(groups), centre=centre, unknown=unknown)
     elif name in {"per-premise", "uncertain"} and not groups:
         polytope = BlockPolytope.per_premise(low, high, centre=centre, unknown=unknown)
+    elif name in {"ts", "rules"} and not groups and system.given_by_rules:
+        polytope = BlockPolytope.of_rules(low, high, unknown=unknown)
+    elif name == "rules" and not groups:
+        raise InputError(system.name, "representation", representation, "a system given by rules; of others, ts")
     elif name == "ts" and not groups:
         polytope = BlockPolytope.takagi_sugeno(low, high, unknown=unknown)
     elif name == "reduced" and not groups:

@@ -223,7 +223,7 @@ def _points(model: PolytopicModel) -> Iterator[tuple[Fraction, ...]]:
     The equilibrium, 0 and the centre first; then points at which an entry of A or B vanishes, where a chain of inputs
     and states may break; then corners. `MOST_POINTS` at most.
     """
-    return islice(dict.fromkeys(_candidates(model)), MOST_POINTS)
+    return islice(filter(model.polytope.holds, dict.fromkeys(_candidates(model))), MOST_POINTS)
 
 
 def _candidates(model: PolytopicModel) -> Iterator[tuple[Fraction, ...]]:
@@ -237,7 +237,7 @@ def _candidates(model: PolytopicModel) -> Iterator[tuple[Fraction, ...]]:
     for p, root in _roots(system):
         if bounds[p][0] <= root <= bounds[p][1]:
             yield from (tuple(root if k == p else z for k, z in enumerate(base)) for base in (start, centre))
-    if len(polytope.blocks) == 1 and polytope.blocks[0].kind == "simplex":
+    if len(polytope.blocks) == 1 and polytope.blocks[0].kind != "box":
         yield from (tuple(z) for z in polytope.exact_offsets(range(polytope.vertex_count)))
     yield from islice(product(*bounds), MOST_CORNERS)
     yield tuple(high for _, high in bounds)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
 from math import inf, nextafter
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 import sympy as sp
@@ -19,11 +19,9 @@ from quasilpv.systems.equations import Equilibrium, equation_matrices
 from quasilpv.systems.measured import with_kinds
 from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
 from quasilpv.systems.premise_search import find_premises
+from quasilpv.systems.rules import affine_in_memberships, membership_premises, read_constant
 from quasilpv.systems.uncertainty import NormBoundedUncertainty
-from quasilpv.systems.vocabulary import Bounds, Formula, Name, Vocabulary, symbol
-
-SymbolicMatrix: TypeAlias = "sp.Matrix | Sequence[Sequence[Formula]]"
-"""A matrix of sympy, or rows of expressions, numbers and formulas as text."""
+from quasilpv.systems.vocabulary import Bounds, Formula, Name, SymbolicMatrix, Vocabulary, exact, symbol
 
 SHOWN_PREMISES = 6
 """In the short description of a system."""
@@ -49,6 +47,11 @@ class DescriptorSystem:
         premises: z_1 ... z_p with bounds valid over the domain.
         E, A, B, C: affine matrices, n x n, n x n, n x m, o x n, with E = diag(E_1, 0): the algebraic states come last.
         domain: interval of every symbol the premises depend on; of other states it may be infinite.
+        disturbance: what the equations leave over at a rounded equilibrium, d in ``E x' = A x + B u + d`` with one
+            number per row; empty if they leave nothing. No condition accounts for it: a verdict is about d = 0, and
+            whoever states one reports d.
+        given_by_rules: the premises are the memberships of all rules but the last of a Takagi-Sugeno model: their
+            sector coordinates sum to at most 1 (`from_rules`).
 
     Raises:
         InputError: the shapes of the parts do not agree, or E has not the form diag(E_1(z), 0).
@@ -66,6 +69,7 @@ class DescriptorSystem:
     C: AffineMatrix
     domain: Mapping[sp.Symbol, tuple[float, float]]
     disturbance: tuple[float, ...] = ()
+    given_by_rules: bool = False
 
     def __post_init__(self) -> None:
         """Refuse parts whose sizes disagree and states in another order than differential, algebraic."""
@@ -125,7 +129,7 @@ class DescriptorSystem:
         """
         bases = [premise.expression for premise in premises or ()]
         names = Vocabulary(name, state, inputs, domain, unknown=unknown, declared=bases)
-        matrices = [_read(names, field, matrix) for field, matrix in zip("EABC", (E, A, B, C), strict=True)]
+        matrices = [names.read_matrix(field, matrix) for field, matrix in zip("EABC", (E, A, B, C), strict=True)]
         if premises is not None:
             premises = [replace(p, expression=names.read(f"premise {p.name}", p.expression)) for p in premises]
         names.finish()
@@ -154,7 +158,10 @@ class DescriptorSystem:
             state=tuple(state),
             inputs=tuple(each.name for each in names.inputs),
             premises=with_kinds(premises, state, affine[-1]),
-            **dict(zip("EABC", affine, strict=True)),
+            E=affine[0],
+            A=affine[1],
+            B=affine[2],
+            C=affine[3],
             domain=dict(domain),
             disturbance=disturbance,
         )
@@ -215,6 +222,61 @@ class DescriptorSystem:
             disturbance=matrices.d if any(matrices.d) else (),
         )
 
+    @classmethod
+    def from_rules(
+        cls,
+        rules: Sequence[tuple[Formula, SymbolicMatrix, SymbolicMatrix, SymbolicMatrix]],
+        *,
+        name: str = "system",
+        state: str | Sequence[Name],
+        inputs: str | Sequence[Name] = (),
+        C: SymbolicMatrix | None = None,
+        domain: Mapping[Any, Any],
+        unknown: str | Collection[Name] = (),
+    ) -> DescriptorSystem:
+        """The Takagi-Sugeno model ``sum_i h_i(x) (E_i x' - A_i x - B_i u) = 0``.
+
+        Its premises are the memberships of all rules but the last, and its representation ``rules`` (also ``ts``) has a
+        vertex for each rule. A box of memberships would hold points where they sum to more than 1, and lose solutions.
+
+        Args:
+            rules: ``(h_i, E_i, A_i, B_i)`` with a membership function h_i of states or parameters and matrices of
+                numbers, n x n, n x n and n x m.
+            name: identifier.
+            state: names of x, differential states first.
+            inputs: names of u.
+            C: outputs, o x n, of numbers; the whole state if not given.
+            domain: by name, the interval of everything the memberships depend on.
+            unknown: parameters unknown to the controller.
+
+        Raises:
+            InputError: the memberships are not proved to sum to 1 or not to be negative over the domain, an entry of a
+                matrix is no number, shapes do not agree, or names or domain as in `from_symbols`.
+        """
+        names = Vocabulary(name, state, inputs, domain, unknown=unknown)
+        memberships = [exact(names.read(f"h_{i}", rule[0])) for i, rule in enumerate(rules, 1)]
+        parts = [
+            [read_constant(names, f"{field}_{i}", matrix) for field, matrix in zip("EAB", rule[1:], strict=True)]
+            for i, rule in enumerate(rules, 1)
+        ]
+        names.finish()
+        premises = membership_premises(names, memberships)
+        outputs = np.eye(len(names.state)) if C is None else read_constant(names, "C", C)
+        affine = [affine_in_memberships(name, field, [part[k] for part in parts]) for k, field in enumerate("EAB")]
+        affine.append(AffineMatrix(outputs, np.zeros((len(premises), *outputs.shape))))
+        return cls(
+            name=name,
+            state=names.state,
+            inputs=tuple(each.name for each in names.inputs),
+            premises=with_kinds(premises, names.state, affine[-1]),
+            E=affine[0],
+            A=affine[1],
+            B=affine[2],
+            C=affine[3],
+            domain=dict(names.domain),
+            given_by_rules=True,
+        )
+
     def __repr__(self) -> str:
         """In a few lines: name, sizes, premises."""
         names = ", ".join(symbol.name for symbol in self.state)
@@ -224,6 +286,8 @@ class DescriptorSystem:
         shown = [f"  {p.name} in [{p.lower:.4g}, {p.upper:.4g}], {p.kind.value}" for p in first]
         if len(self.premises) > SHOWN_PREMISES:
             shown.append(f"  and {len(self.premises) - SHOWN_PREMISES} more premises")
+        if self.disturbance:
+            shown.append(f"  constant disturbance of at most {max(map(abs, self.disturbance)):.2g}, in no verdict")
         inputs = ", ".join(self.inputs) or "none"
         return "\n".join([f"{self.name}: {kinds} states {names}; inputs {inputs}", *shown])
 
@@ -301,19 +365,6 @@ class DescriptorSystem:
     @cached_property
     def _premise_function(self) -> Any:
         return sp.lambdify((*self.state, *self.parameters), [p.expression for p in self.premises], "numpy")
-
-
-def _read(names: Vocabulary, field: str, matrix: SymbolicMatrix) -> sp.Matrix:
-    """A matrix in the symbols of the vocabulary."""
-    if isinstance(matrix, sp.MatrixBase):
-        shape, rows = matrix.shape, matrix.tolist()
-    else:
-        rows = [[*row] for row in matrix]
-        shape = (len(rows), len(rows[0]) if rows else 0)
-        if any(len(row) != shape[1] for row in rows):
-            raise InputError(names.source, field, "rows of different length", "a matrix")
-    entries = [names.read(f"{field}[{i},{j}]", entry) for i, row in enumerate(rows) for j, entry in enumerate(row)]
-    return sp.Matrix(*shape, entries)
 
 
 def _shifted(source: str, name: sp.Symbol, bounds: Bounds, around: Equilibrium) -> Bounds:

@@ -20,6 +20,8 @@ from quasilpv.systems.formula import parse_equation, split_names
 
 Name: TypeAlias = "str | sp.Symbol | AppliedUndef"
 Formula: TypeAlias = "str | sp.Expr | sp.Eq | float"
+SymbolicMatrix: TypeAlias = "sp.Matrix | Sequence[Sequence[Formula]]"
+"""A matrix of sympy, or rows of expressions, numbers and formulas as text."""
 Bounds: TypeAlias = "tuple[float, float]"
 
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
@@ -127,6 +129,18 @@ class Vocabulary:
         for stranger in sorted(expression.free_symbols - set(allowed), key=str):
             self._refuse_stranger(field, stranger, allowed)
         return expression
+
+    def read_matrix(self, field: str, matrix: SymbolicMatrix) -> sp.Matrix:
+        """A matrix whose entries are read as formulas of states and parameters. Errors: `read`."""
+        if isinstance(matrix, sp.MatrixBase):
+            shape, rows = matrix.shape, matrix.tolist()
+        else:
+            rows = [[*row] for row in matrix]
+            shape = (len(rows), len(rows[0]) if rows else 0)
+            if any(len(row) != shape[1] for row in rows):
+                raise InputError(self.source, field, "rows of different length", "a matrix")
+        entries = [self.read(f"{field}[{i},{j}]", entry) for i, row in enumerate(rows) for j, entry in enumerate(row)]
+        return sp.Matrix(*shape, entries)
 
     def _refuse_stranger(self, field: str, stranger: sp.Symbol, allowed: Sequence[sp.Symbol]) -> None:
         """A symbol that is not declared, or not allowed here."""
