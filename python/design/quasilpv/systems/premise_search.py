@@ -67,6 +67,15 @@ def find_premises(
     return premises, affine
 
 
+def dimension(entries: Iterable[Expansion]) -> int:
+    """How many premises entries have between them: the dimension of what they span up to constants.
+
+    Dependences of functions that are no identities of terms (cos^2 x = 1 - sin^2 x) are not looked for.
+    """
+    vectors = [{term: number for term, number in entry.items() if term != 1} for entry in entries]
+    return len(_reduced_basis(vectors, list(dict.fromkeys(term for vector in vectors for term in vector))))
+
+
 def _flat(entries: Iterable[Iterable[Expansion]]) -> Iterable[Expansion]:
     return (numbers for matrix in entries for numbers in matrix)
 
