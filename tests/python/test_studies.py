@@ -209,7 +209,7 @@ class TestCommands:
         answer = json.loads(done.stdout)
         assert done.returncode == 0
         sizes = {"certified", "margin", "unknowns", "rows", "seconds"}
-        assert set(answer) == {"verdict", "evidence", "reason", "refutation"} | sizes
+        assert set(answer) == {"verdict", "evidence", "reason", "relies_on", "refutation"} | sizes
         assert (answer["verdict"], answer["evidence"], answer["certified"]) == ("feasible", "proved", True)
         assert answer["margin"] > 0
 

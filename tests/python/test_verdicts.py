@@ -4,6 +4,7 @@ import json
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -264,7 +265,8 @@ def test_an_answer_is_short_and_says_how_sure() -> None:
 def test_an_answer_survives_its_document() -> None:
     """All but the law."""
     for name, b in (("I.2", 1.0), ("I.1", 1.0), ("I.2", 9.0)):
-        answer = Sweep(Question("ex-I.1", name, parameters=(("b", b),)), ()).at({})
+        answer = replace(answered(Question("ex-I.1", name, parameters=(("b", b),))), law=None)
+        assert {one.status.value for one in answer.relies_on} == {"proved", "assumed"}
         assert Answer.from_document(json.loads(json.dumps(answer.to_document()))) == answer
 
 
@@ -399,6 +401,7 @@ def test_the_commands_say_what_is_proved(tmp_path: Path, capsys: pytest.CaptureF
     answer = json.loads(capsys.readouterr().out)
     assert (answer["verdict"], answer["evidence"]) == ("infeasible", "proved")
     assert set(answer["refutation"]) == {"point", "eigenvalue", "states"}
+    assert all(set(one) == {"name", "status", "detail"} for one in answer["relies_on"])
     assert run(["solve", name, "-c", "I.1", "--set", "r=2.5"]) == 1
     assert capsys.readouterr().out.startswith("infeasible, proved: at z1 = ")
     assert run(["solve", name, "-c", "I.1", "--set", "r=0.3"]) == 0

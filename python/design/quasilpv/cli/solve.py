@@ -5,6 +5,7 @@ from __future__ import annotations
 from quasilpv.cli.console import JsonOption, print_json
 from quasilpv.cli.parameters import asks_one_question
 from quasilpv.studies import Verdict, answered
+from quasilpv.studies.answer import reliance_document
 from quasilpv.studies.question import Question, largest_or_reached_margin
 
 
@@ -32,6 +33,7 @@ def solve_command(
                 "verdict": answer.verdict.value,
                 "evidence": answer.evidence and answer.evidence.value,
                 "reason": answer.reason,
+                "relies_on": [reliance_document(one) for one in answer.relies_on],
                 "refutation": answer.refutation and answer.refutation.to_document(),
                 "certified": answer.certified,
                 "margin": margin,
@@ -42,6 +44,9 @@ def solve_command(
         )
     else:
         print(f"{answer.headline}: {answer.reason}")
+        if answer.verdict is Verdict.FEASIBLE:
+            for one in answer.relies_on:
+                print(f"  {one.status.value}: {one.name}; {one.detail}")
         shown = "unknown" if margin is None else f"{margin:.3g}"
         print(f"margin {shown}, {answer.unknowns} unknowns, {answer.rows} rows, {answer.seconds:.3f} s")
     return 0 if answer.verdict is Verdict.FEASIBLE else 1

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
+from quasilpv.conditions.reliance import Reliance, Relied, Status
 from quasilpv.polytopes.units import Units
 from quasilpv.studies.law import Law
 from quasilpv.studies.refutation import Refutation
@@ -45,6 +46,8 @@ class Answer:
             in both (`quasilpv.polytopes.units`).
         witness: the kept unknowns at which every inequality was proved, in these units, for `Sweep.proves`; empty if
             there is no such proof.
+        relies_on: what a solution is worth nothing without, each proved, refuted or assumed; empty if it was not asked
+            for.
         law: of a solution, if it was asked for and the condition gives one.
     """
 
@@ -58,6 +61,7 @@ class Answer:
     refutation: Refutation | None = None
     units: Units | None = None
     witness: tuple[float, ...] = ()
+    relies_on: tuple[Relied, ...] = ()
     law: Law | None = None
 
     @property
@@ -74,6 +78,9 @@ class Answer:
     def __repr__(self) -> str:
         """In a few lines."""
         lines = [f"{self.headline}: {self.reason}"]
+        assumed = [f"{one.name} ({one.detail})" for one in self.relies_on if one.status is Status.ASSUMED]
+        if self.verdict is Verdict.FEASIBLE and assumed:
+            lines.append(f"assumed: {'; '.join(assumed)}")
         if self.law is not None:
             lines.append(f"law: {self.law!r}".replace("\n", "\n     "))
         return "\n".join([*lines, f"{self.unknowns} unknowns, {self.rows} rows, {self.seconds:.3f} s"])
@@ -92,6 +99,7 @@ class Answer:
             "refutation": refutation,
             "units": None if self.units is None else asdict(self.units),
             "witness": list(self.witness),
+            "relies_on": [reliance_document(one) for one in self.relies_on],
         }
 
     @classmethod
@@ -106,8 +114,18 @@ class Answer:
                 "refutation": None if refuted is None else Refutation.from_document(refuted),
                 "units": None if units is None else _units(units),
                 "witness": tuple(map(float, document["witness"])),
+                "relies_on": tuple(map(_relied, document["relies_on"])),
             }
         )
+
+
+def reliance_document(one: Relied) -> dict[str, str]:
+    """JSON-able: name, status and detail of something relied on."""
+    return {"name": one.name, "status": one.status.value, "detail": one.detail}
+
+
+def _relied(document: dict[str, str]) -> Relied:
+    return Relied(Reliance(document["name"]), Status(document["status"]), document["detail"])
 
 
 def _units(document: dict[str, Any]) -> Units:

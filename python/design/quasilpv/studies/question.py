@@ -264,7 +264,7 @@ def answered(question: Question) -> Answer:
     finding = solution(decision, 1)
     if not decision.feasible:
         finding = examine(_case(question, compiled, lambda: model), decision)
-    answer = _answer(compiled, finding, start)
+    answer = replace(_answer(compiled, finding, start), relies_on=known.relied(model))
     if answer.verdict is not Verdict.FEASIBLE:
         return answer
     return replace(answer, law=Law.of(model.system, known.id, finding.feedback(statement)))
