@@ -150,6 +150,20 @@ TEST_F(LatchedFault, keeps_the_50_samples_before_it_and_itself_as_the_last_one) 
   EXPECT_EQ(samples[49].state, static_cast<std::int32_t>(ControllerState::kFault));
 }
 
+TEST_F(LatchedFault, shows_no_torque_in_telemetry_but_the_safe_one) {
+  auto ring = std::make_unique<SampleRing>();
+  loop_.publish_to(ring.get());
+  for (std::int64_t seq = 80; seq < 180; ++seq) {  // an arm that falls: the law would answer with all it has
+    loop_.handle(reading(seq, {kStart[0] + 0.1 * static_cast<double>(seq - 80), kStart[1], kStart[2]}), at(seq));
+    telemetry_v1 sample;
+    ASSERT_TRUE(ring->pop(sample));
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      ASSERT_EQ(sample.commanded_torque_nm[j], torque_of(loop_)[j]);
+      ASSERT_EQ(sample.applied_torque_nm[j], torque_of(loop_)[j]);
+    }
+  }
+}
+
 TEST_F(LatchedFault, is_not_left_while_angles_are_missing) {
   EXPECT_FALSE(loop_.reset_fault());
   EXPECT_EQ(loop_.state(), ControllerState::kFault);

@@ -162,7 +162,9 @@ void ControlLoop::write_telemetry(const StepInput& input, const StepReport& repo
   copy(report.estimated_disturbance, telemetry_.estimated_disturbance);
   copy(report.filtered_disturbance, telemetry_.filtered_disturbance);
   copy(report.integral_error, telemetry_.integral_error_rad_s);
-  copy(report.torque_commanded, telemetry_.commanded_torque_nm);
+  // In Fault the law runs on beside a robot that it does not move; what it would command then is nobody's torque.
+  const bool is_law_in_force = failsafe_.state != ControllerState::kFault;
+  copy(is_law_in_force ? report.torque_commanded : last_torque_, telemetry_.commanded_torque_nm);
   copy(last_torque_, telemetry_.applied_torque_nm);
   std::copy(report.premise.begin(), report.premise.end(), telemetry_.premise);
   const MonitorReport seen = monitor_.observe(input, report);
