@@ -1,5 +1,6 @@
 """Questions, boundaries, maps and counts."""
 
+import hashlib
 import json
 import subprocess
 import sys
@@ -13,7 +14,8 @@ import pytest
 from quasilpv.cli import run
 from quasilpv.conditions.condition import Options
 from quasilpv.errors import InputError
-from quasilpv.lmi.compiled import CompiledProblem
+from quasilpv.lmi.common import common_problem
+from quasilpv.lmi.compiled import CompiledProblem, compile_family
 from quasilpv.lmi.feasibility import decide
 from quasilpv.studies import Answer, Question, Sweep, Verdict, count, find_boundary
 from quasilpv.studies.boundary import Interval
@@ -124,7 +126,7 @@ def test_a_map_interrupted_and_resumed_equals_one_that_was_not(full_map: Region,
         make_map(solver=solve_twelve, memory=Checkpoint(tmp_path, QUESTION, ("a", "b"))).full()
     (kept,) = tmp_path.iterdir()
     with kept.open("a", encoding="utf-8") as file:
-        file.write('{"place": [1.0, ')  # cut while a line was being written
+        file.write('{"places": [[1.0, ')  # cut while a line was being written
     solved: list[Task] = []
 
     def counting(tasks: Sequence[Task]) -> Iterable[Answer]:
@@ -145,6 +147,160 @@ def test_a_checkpoint_of_something_else_is_refused(tmp_path: Path) -> None:
         Checkpoint(tmp_path, QUESTION, ("a", "b"))
     other = Checkpoint(tmp_path, replace(QUESTION, options=Options(decay_rate=1.0)), ("a", "b"))
     assert other.path != place
+
+
+@pytest.fixture(scope="module")
+def area_map() -> Region:
+    return make_map().areas()
+
+
+def test_every_proved_area_is_feasible_wherever_it_is_asked(area_map: Region) -> None:
+    """The problem is built anew at points of no grid, and the solution for the corners is put into it."""
+    assert area_map.areas is not None
+    family = compile_family(lambda point: QUESTION.at(point).statement().problem, {"a": 1.0, "b": 1.0})
+    assert family is not None
+    rng = np.random.default_rng(13)
+    assert area_map.areas.proved
+    for cell in area_map.areas.proved:
+        corners = [{"a": a, "b": b} for a in cell.x for b in cell.y]
+        decision = decide(common_problem(family, corners))
+        assert decision.feasible
+        for share in rng.integers(0, 2**20, (2, 2)) / 2.0**20:
+            a, b = (low + share[k] * (high - low) for k, (low, high) in enumerate((cell.x, cell.y)))
+            compiled = CompiledProblem.of(QUESTION.at({"a": a, "b": b}).statement().problem)
+            whole = np.zeros(compiled.layout.unknowns)
+            whole[family.layout.kept] = decision.point
+            everything = replace(compiled, layout=replace(compiled.layout, kept=np.arange(whole.size)))
+            assert everything.holds_exactly(whole)
+
+
+def test_areas_agree_with_the_full_map_at_every_point(area_map: Region, full_map: Region) -> None:
+    assert area_map.areas is not None
+    full = {(p.x, p.y): p.answer.verdict for p in full_map.points}
+    assert {(p.x, p.y): p.answer.verdict for p in area_map.points}.items() <= full.items()
+    for (x, y), verdict in full.items():
+        inside = [r for r in area_map.areas.proved if r.x[0] <= x <= r.x[1] and r.y[0] <= y <= r.y[1]]
+        assert not inside or verdict is Verdict.FEASIBLE
+    total = (X.end - X.start) * (Y.end - Y.start)
+    shares = [
+        sum((r.x[1] - r.x[0]) * (r.y[1] - r.y[0]) for r in cells) / total
+        for cells in (area_map.areas.proved, area_map.areas.undecided)
+    ]
+    assert shares == pytest.approx([area_map.areas.proved_share, area_map.areas.undecided_share])
+    assert area_map.to_document()["proved_share"] == area_map.areas.proved_share > 0.5
+    assert full_map.to_document()["proved_share"] is None
+
+
+def test_processes_and_direction_of_an_axis_do_not_change_areas(area_map: Region) -> None:
+    assert without_times(make_map(solver=in_processes(2)).areas()) == without_times(area_map)
+    forgetful = {"solver": in_processes(1), "memory": Forgetful(), "progress": lambda done, total: None}
+    turned = Map(QUESTION, Axis("a", X.end, X.start, X.count), Y, **forgetful).areas()  # type: ignore[arg-type]
+    assert turned.areas is not None
+    assert area_map.areas is not None
+    assert turned.areas.proved_share == pytest.approx(area_map.areas.proved_share, abs=2.0 / 32.0)
+
+
+@pytest.mark.parametrize(
+    ("question", "axes"),
+    [
+        (Question("arm2", "II.6"), (Axis("theta_max", 0.5, 1.0, 2), Axis("m2", 1.0, 2.0, 2))),
+        (Question("arm2", "I.2", "reduced"), (Axis("m2", 1.0, 2.0, 2), Axis("fv1", 0.0, 1.0, 2))),
+    ],
+)
+def test_where_the_data_are_not_affine_areas_are_refused(question: Question, axes: tuple[Axis, Axis]) -> None:
+    """A mass at an arm that is not affine in it, and a bound of the premises."""
+    survey = Map(question, *axes, solver=in_processes(1), memory=Forgetful(), progress=lambda done, total: None)
+    assert not survey.proves_areas
+    with pytest.raises(InputError, match="affine"):
+        survey.areas()
+
+
+def test_areas_interrupted_and_resumed_equal_those_that_were_not(area_map: Region, tmp_path: Path) -> None:
+    first = make_map(memory=Checkpoint(tmp_path, QUESTION, ("a", "b"))).areas()
+    (kept,) = tmp_path.iterdir()
+    lines = kept.read_bytes().splitlines(keepends=True)
+    kept.write_bytes(b"".join(lines[: len(lines) * 2 // 3]) + lines[-1][:40])
+    solved: list[Task] = []
+
+    def counting(tasks: Sequence[Task]) -> Iterable[Answer]:
+        solved.extend(tasks)
+        return map(solve_task, tasks)
+
+    memory = Checkpoint(tmp_path, QUESTION, ("a", "b"))
+    resumed = make_map(memory=memory, solver=counting).areas()
+    assert without_times(resumed) == without_times(first) == without_times(area_map)
+    assert len(solved) == first.evaluations - (len(lines) * 2 // 3 - 1) > 0
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("checkpoint")
+    make_map(memory=Checkpoint(folder, QUESTION, ("a", "b"))).areas()
+    (path,) = folder.iterdir()
+    return path
+
+
+class TestEditedCheckpoint:
+    """Whatever is changed in a checkpoint, nothing that is not proved is called feasible."""
+
+    @staticmethod
+    def refusal(written: Path, tmp_path: Path, lines: Sequence[bytes]) -> str:
+        (tmp_path / written.name).write_bytes(b"".join(line + b"\n" for line in lines))
+        with pytest.raises(InputError) as caught:
+            make_map(memory=Checkpoint(tmp_path, QUESTION, ("a", "b"))).areas()
+        assert "\n" not in str(caught.value)
+        assert written.name in str(caught.value)
+        return str(caught.value)
+
+    @pytest.mark.parametrize("change", ["flip", "drop", "swap", "digit", "repeat"])
+    def test_a_line_that_was_changed_lost_or_moved_is_refused(self, written: Path, tmp_path: Path, change: str) -> None:
+        lines = written.read_bytes().splitlines()
+        at = next(k for k, line in enumerate(lines) if b'"infeasible"' in line)
+        edited = {
+            "flip": [*lines[:at], lines[at].replace(b'"infeasible"', b'"feasible"'), *lines[at + 1 :]],
+            "drop": [*lines[:at], *lines[at + 1 :]],
+            "swap": [*lines[:at], lines[at + 1], lines[at], *lines[at + 2 :]],
+            "digit": [*lines[:at], lines[at].replace(b"0", b"1", 1), *lines[at + 1 :]],
+            "repeat": [*lines[: at + 1], *lines[at:]],
+        }[change]
+        assert "hash" in self.refusal(written, tmp_path, edited)
+
+    @pytest.mark.parametrize("forgery", ["no witness", "another witness", "shorter witness"])
+    def test_when_the_hashes_are_made_anew_expect_the_proof_checked(
+        self, written: Path, tmp_path: Path, forgery: str
+    ) -> None:
+        entries = [json.loads(line) for line in written.read_bytes().splitlines()]
+        proof = next(entry for entry in entries[1:] if entry["verdict"] == "feasible")
+        for entry in entries[1:]:
+            if entry["verdict"] == "infeasible":
+                entry["verdict"], entry["evidence"] = "feasible", "proved"
+                entry["witness"] = {
+                    "no witness": [],
+                    "another witness": proof["witness"],
+                    "shorter witness": proof["witness"][:-1],
+                }[forgery]
+        chain, lines = "", []
+        for entry in entries:
+            del entry["hash"]
+            body = json.dumps(entry)
+            chain = hashlib.sha256((chain + body).encode()).hexdigest()
+            lines.append(f'{body[:-1]}, "hash": "{chain}"}}'.encode())
+        assert "does not hold" in self.refusal(written, tmp_path, lines)
+
+    @pytest.mark.parametrize(
+        ("first", "words"),
+        [
+            (b'{"place": [1.0, 2.0], "verdict": "feasible", "certified": true}', "version 1"),
+            (b'{"schema": "quasilpv.map-checkpoint", "schema_version": 3}', "schema_version: got 3, expected 2"),
+            (b'{"schema": "quasilpv.artifact", "schema_version": 2}', "line 1"),
+            (b"[]", "line 1"),
+            (b"\xff\xfe", "line 1"),
+        ],
+    )
+    def test_another_version_or_document_is_refused(
+        self, written: Path, tmp_path: Path, first: bytes, words: str
+    ) -> None:
+        assert words in self.refusal(written, tmp_path, [first, *written.read_bytes().splitlines()[1:]])
 
 
 def test_no_scheduler_is_a_clear_error() -> None:
@@ -224,7 +380,7 @@ class TestCommands:
         axes = ("--x", "a=-2:6:3", "--y", "b=-4:8:3")
         done = self.design("region", "ex-I.1", "-c", "II.6", *axes, "-j", "1", "-o", str(tmp_path), "--json")
         document = json.loads(done.stdout)
-        assert {"points", "boundary", "seconds_per_point"} <= set(document)
+        assert {"points", "boundary", "seconds_per_point", "proved_share", "areas"} <= set(document)
         assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png", ".svg", ".jsonl"}
         assert len(document["points"]) == 9
 
@@ -243,14 +399,21 @@ class TestCommands:
             return {path: path.read_bytes() for path in tmp_path.iterdir() if path.suffix != ".jsonl"}
 
         made = mapped("a=-2:6:3")
-        for number, change in enumerate((("a=-2:6:5",), ("a=-2:2:3",), ("a=-2:6:5", "--grid")), start=2):
+        changes = (("a=-2:6:5",), ("a=-2:2:3",), ("a=-2:6:5", "--grid"), ("a=-2:6:5", "--adaptive"))
+        for number, change in enumerate(changes, start=2):
             more = mapped(*change)
             assert made.items() <= more.items()
             assert len(more) == 3 * number  # JSON, PNG, SVG
             made = more
         assert mapped("a=-2:6:3").keys() == made.keys()
         assert len(list(tmp_path.glob("*.jsonl"))) == 1
-        assert "points known from" in capsys.readouterr().err
+        said = capsys.readouterr()
+        assert "answers known from" in said.err
+        assert [line.split(",")[0].split(":")[0] for line in said.out.splitlines()[::2]] == [
+            *["feasible"] * 3,
+            *["points only"] * 2,
+            "feasible",
+        ]
 
     @pytest.mark.parametrize(
         ("arguments", "words"),

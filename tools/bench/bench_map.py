@@ -26,9 +26,13 @@ from bench_solvers import SOLVERS, Conic, decide_with
 
 from quasilpv.lmi.compiled import CompiledFamily, CompiledProblem, compile_family
 from quasilpv.studies import Question, Sweep, Verdict
+from quasilpv.studies.checkpoint import Forgetful
+from quasilpv.studies.engines import in_processes
+from quasilpv.studies.region import Axis, Map, sweep_of
 
 QUESTION = Question("ex-I.1", "II.6")
 NAME = "II.6 of ex-I.1, grid point"
+AREAS = "II.6 of ex-I.1, map by areas, per grid point"
 NAIVE, PARAMETRISED = "cvxpy, built anew", "cvxpy, compiled once (DPP)"
 CLARABEL = {"solver": cp.CLARABEL, "max_threads": 1, "direct_solve_method": "faer"}
 """As `quasilpv.lmi.feasibility` sets it; everything else is Clarabel's default on all sides."""
@@ -188,7 +192,29 @@ def measure_map(*, quick: bool) -> tuple[list[Row], list[str]]:
         for name in others
     ]
     rows.append(row(f"{NAME}s: compiled, once", once[0], "ms", (PARAMETRISED, once[1])))
-    return rows, notes
+    areas, note = measure_areas(9 if quick else 33)
+    rows.append(row(f"{AREAS}, beside {PARAMETRISED}", areas, "ms", (PARAMETRISED, timed[PARAMETRISED].milliseconds)))
+    return rows, [*notes, note]
+
+
+def measure_areas(count: int) -> tuple[float, str]:
+    """CPU time of a map by areas, ms per point of the grid whose resolution it has, compiling included; and a note.
+
+    Args:
+        count: points along each axis.
+    """
+    sweep_of.cache_clear()
+    axes = Axis("a", -8.0, 8.0, count), Axis("b", -20.0, 20.0, count)
+    start = process_time_ns()
+    areas = Map(QUESTION, *axes, solver=in_processes(1), memory=Forgetful(), progress=lambda done, known: None).areas()
+    spent = (process_time_ns() - start) * 1e-6 / count**2
+    if areas.areas is None:
+        raise DisagreementError(f"{AREAS}: no areas")
+    proved, undecided = areas.areas.proved_share, areas.areas.undecided_share
+    return spent, (
+        f"{AREAS}: {count} x {count}, {areas.evaluations} problems solved; {proved:.1%} of the area proved by "
+        f"{len(areas.areas.proved)} solutions, {undecided:.1%} undecided"
+    )
 
 
 def agreement(timed: Mapping[str, Timed], same: Mapping[str, Any]) -> list[str]:

@@ -1,22 +1,26 @@
-"""Maps of feasibility: proved points, the boundary, and what is known not to be feasible."""
+"""Maps of feasibility: proved areas and points, their edge, and where nothing feasible was found."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, style
-from quasilpv.studies.answer import Verdict
+from quasilpv.studies.answer import Evidence, Verdict
 from quasilpv.studies.question import Question
-from quasilpv.studies.region import Region
+from quasilpv.studies.region import Rectangle, Region
 from quasilpv.systems.catalogue import system_kind
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, BLACK)
 INFEASIBLE_COLOUR = "#bdbdbd"
+PROVED_LOOK = {"facecolor": SKY, "edgecolor": BLUE, "alpha": 0.6}
+UNDECIDED_LOOK = {"facecolor": "none", "edgecolor": ORANGE, "hatch": "/////"}
 
 
 def region_figure(
@@ -28,8 +32,8 @@ def region_figure(
 ) -> Figure:
     """One or several maps over the same axes.
 
-    One map shows its grid points by verdict; several are nested markers of decreasing size, largest region first, each
-    with its boundary.
+    One map shows its proved and undecided areas if it has them, and its grid points by verdict; several are nested
+    markers of decreasing size, largest region first, each with its boundary.
 
     Args:
         regions: at least one, all with the same axes.
@@ -57,16 +61,29 @@ def region_figure(
 
 def _verdicts(axes: Axes, region: Region) -> None:
     looks = {
-        Verdict.INFEASIBLE: ("x", INFEASIBLE_COLOUR, "infeasible (numerical)"),
-        Verdict.UNKNOWN: ("$?$", VERMILION, "unknown"),
-        Verdict.FEASIBLE: ("o", BLUE, "feasible, proved"),
+        (Verdict.INFEASIBLE, Evidence.NUMERICAL): ("x", INFEASIBLE_COLOUR, "infeasible (numerical)"),
+        (Verdict.INFEASIBLE, Evidence.PROVED): ("X", BLACK, "infeasible, proved"),
+        (Verdict.UNKNOWN, None): ("$?$", VERMILION, "unknown"),
+        (Verdict.FEASIBLE, Evidence.PROVED): ("o", BLUE, "feasible, proved"),
     }
     size = _marker_size(region)
-    for verdict, (marker, colour, label) in looks.items():
-        places = np.array([(p.x, p.y) for p in region.points if p.answer.verdict is verdict])
+    if region.areas:
+        del looks[Verdict.FEASIBLE, Evidence.PROVED]  # corners of proved areas, or of undecided ones
+        _rectangles(axes, region.areas.proved, f"proved, {region.areas.proved_share:.1%}", PROVED_LOOK)
+        _rectangles(axes, region.areas.undecided, f"undecided, {region.areas.undecided_share:.1%}", UNDECIDED_LOOK)
+    for known, (marker, colour, label) in looks.items():
+        places = np.array([(p.x, p.y) for p in region.points if (p.answer.verdict, p.answer.evidence) == known])
         if places.size:
             axes.plot(*places.T, linestyle="none", marker=marker, color=colour, markersize=size, label=label)
-    _boundary(axes, region, BLACK, "boundary")
+    if not region.areas:
+        _boundary(axes, region, BLACK, "boundary")
+
+
+def _rectangles(axes: Axes, rectangles: Sequence[Rectangle], label: str, look: Mapping[str, Any]) -> None:
+    """Rectangles as one collection, with one entry in the legend."""
+    corners = [[(r.x[i], r.y[j]) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))] for r in rectangles]
+    if corners:
+        axes.add_collection(PolyCollection(corners, linewidth=0.6, label=label, **look))
 
 
 def _label(region: Region) -> str:

@@ -36,7 +36,7 @@ def grid(
     """
     places = [(float(a), float(b)) for a in x.values for b in y.values]
     points = [{x.name: a, y.name: b, **also(a, b)} for a, b in places]
-    tasks = [Task(question, tuple(point), tuple(point.values())) for point in points]
+    tasks = [Task(question, tuple(point), (tuple(point.values()),)) for point in points]
     answers = list(in_processes(PROCESSES)(tasks))
     answered = tuple(Point(*place, answer) for place, answer in zip(places, answers, strict=True))
     return Region(question, x, y, answered, (), len(answers), sum(answer.seconds for answer in answers))

@@ -1,13 +1,15 @@
-"""Maps: the verdict of a condition over two parameters, on a full grid or along the boundary only.
+"""Maps: the verdict of a condition over two parameters, as areas, on a full grid, or along the boundary only.
 
-Every feasible point of a map is proved in exact arithmetic. The result does not depend on the order in which points are
-solved, nor on how many processes solve them, nor on interruptions: a map is a set of independent answers.
+Every feasible point of a map is proved in exact arithmetic. Where the data are affine in both parameters, one solution
+for the four corners of a rectangle proves all of it (`quasilpv.lmi.common`); elsewhere nothing is known between points.
+The result does not depend on the order in which points are solved, nor on how many processes solve them, nor on
+interruptions: a map is a set of independent answers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Protocol, TypeAlias
@@ -17,11 +19,15 @@ import numpy.typing as npt
 
 from quasilpv.errors import InputError
 from quasilpv.studies.answer import Answer, Verdict
+from quasilpv.studies.quadtree import Cell, Division, Node, divide
 from quasilpv.studies.question import Question, Sweep
 from quasilpv.systems.catalogue import system_kind
 
-Node: TypeAlias = tuple[int, int]
-"""Column and row of a point of the grid."""
+Place: TypeAlias = tuple[float, ...]
+"""Values of the swept parameters."""
+
+Places: TypeAlias = tuple[Place, ...]
+"""One place, or several that are answered by one solution."""
 
 COARSE_STRIDE = 8
 """Largest first spacing of the adaptive map, in grid points; halved where neighbours disagree."""
@@ -87,6 +93,37 @@ class Crossing:
 
 
 @dataclass(frozen=True)
+class Rectangle:
+    """A part of the plane of the two parameters, its border included."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Areas:
+    """What is known between points.
+
+    Attributes:
+        proved: rectangles in which one solution proves every point.
+        undecided: rectangles of one grid spacing along the edge of the proved area.
+        proved_share, undecided_share: of the area of the map. In the rest nothing feasible was found at the points
+            tried, which is no proof.
+    """
+
+    proved: tuple[Rectangle, ...]
+    undecided: tuple[Rectangle, ...]
+    proved_share: float
+    undecided_share: float
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON-able: rectangles as ``[[x, x], [y, y]]``."""
+        document = asdict(self)
+        document.update({name: [[r.x, r.y] for r in getattr(self, name)] for name in ("proved", "undecided")})
+        return document
+
+
+@dataclass(frozen=True)
 class Region:
     """A map.
 
@@ -95,8 +132,9 @@ class Region:
         x, y: the axes.
         points: what was evaluated on the grid, in order of column, then row.
         boundary: where neighbouring points disagree.
-        evaluations: points solved, those along edges included.
+        evaluations: problems solved, those along edges and those of rectangles included.
         seconds: of computation, summed over processes.
+        areas: what is proved between points; None if nothing is.
     """
 
     question: Question
@@ -106,6 +144,7 @@ class Region:
     boundary: tuple[Crossing, ...]
     evaluations: int
     seconds: float
+    areas: Areas | None = None
 
     def to_document(self) -> dict[str, Any]:
         """JSON-able."""
@@ -113,27 +152,35 @@ class Region:
             "question": self.question.to_document(),
             "axes": [{"name": a.name, "start": a.start, "end": a.end, "count": a.count} for a in (self.x, self.y)],
             "points": [
-                {"x": p.x, "y": p.y, "verdict": p.answer.verdict.value, "certified": p.answer.certified}
+                {"x": p.x, "y": p.y, "certified": p.answer.certified}
+                | {name: p.answer.to_document()[name] for name in ("verdict", "evidence")}
                 for p in self.points
             ],
             "boundary": [{"feasible": list(c.feasible), "other": list(c.other)} for c in self.boundary],
+            "proved_share": self.areas.proved_share if self.areas else None,
+            "areas": self.areas.to_document() if self.areas else None,
             "seconds_per_point": self.seconds / max(1, self.evaluations),
         }
 
 
 @dataclass(frozen=True)
 class Task:
-    """A point to solve, as it is sent to a process.
+    """A point to solve, or points for which one solution is wanted, as they are sent to a process.
 
     Attributes:
         question: of the map.
         swept: names of the parameters that change.
-        place: their values.
+        places: their values, at one point or at several.
     """
 
     question: Question
     swept: tuple[str, ...]
-    place: tuple[float, ...]
+    places: Places
+
+    @property
+    def points(self) -> list[dict[str, float]]:
+        """The places by name of the parameters."""
+        return [dict(zip(self.swept, place, strict=True)) for place in self.places]
 
 
 Solver: TypeAlias = Callable[[Sequence[Task]], Iterable[Answer]]
@@ -143,20 +190,22 @@ Solver: TypeAlias = Callable[[Sequence[Task]], Iterable[Answer]]
 class Memory(Protocol):
     """Answers kept between runs; see `quasilpv.studies.checkpoint`."""
 
-    def get(self, place: tuple[float, float]) -> Answer | None:
-        """The answer at a point, if it is known."""
+    def get(self, places: Places) -> Answer | None:
+        """The answer at one place or several, if it is known."""
 
-    def put(self, place: tuple[float, float], answer: Answer) -> None:
+    def put(self, places: Places, answer: Answer) -> None:
         """Keep an answer."""
 
 
 def solve_task(task: Task) -> Answer:
     """Answer one task; a process compiles a family once for all the tasks it is given."""
-    return _sweep(task.question, task.swept).at(dict(zip(task.swept, task.place, strict=True)))
+    sweep, points = sweep_of(task.question, task.swept), task.points
+    return sweep.at(points[0]) if len(points) == 1 else sweep.common(points)
 
 
 @lru_cache(maxsize=4)
-def _sweep(question: Question, swept: tuple[str, ...]) -> Sweep:
+def sweep_of(question: Question, swept: tuple[str, ...]) -> Sweep:
+    """The sweep of a question, compiled once in a process."""
     return Sweep(question, swept)
 
 
@@ -193,7 +242,35 @@ class Map:
             raise InputError("region", "axes", f"{x.name} twice", "two parameters")
         self._question, self._x, self._y = question, x, y
         self._solver, self._memory, self._progress = solver, memory, progress
-        self._answers: dict[tuple[float, float], Answer] = {}
+        self._answers: dict[Places, Answer] = {}
+
+    @property
+    def proves_areas(self) -> bool:
+        """Whether the data are affine in both parameters, so that `areas` can be asked for."""
+        return sweep_of(self._question, self._swept).updates
+
+    def areas(self) -> Region:
+        """Rectangles that are proved as a whole, points only along their edge (`quasilpv.studies.quadtree`).
+
+        Raises:
+            InputError: the data are not affine in both parameters: nothing can be said between points.
+        """
+        if not self.proves_areas:
+            got = f"{self._x.name} and {self._y.name}"
+            raise InputError("region", "areas", got, "two parameters in which the data are affine")
+        division = divide(self._x.count, self._y.count, self)
+        return self._region(self._areas(division), bisections=0)
+
+    def feasible(self, nodes: Sequence[Node]) -> list[bool]:
+        """Whether points of the grid are proved to be feasible; solves what is not known."""
+        self._solve(nodes)
+        return [self._feasible(node) for node in nodes]
+
+    def proved(self, cells: Sequence[Cell]) -> list[bool]:
+        """Whether one solution proves a whole rectangle, for each of them; solves what is not known."""
+        places = [tuple(self._place(corner) for corner in cell.corners) for cell in cells]
+        self._solve_places(places)
+        return [self._answers[place].certified for place in places]
 
     def full(self) -> Region:
         """Every point of the grid."""
@@ -215,12 +292,20 @@ class Map:
             self._solve([node for cell in cells for node in _corners(cell)])
         return self._region()
 
-    def _region(self) -> Region:
+    def _region(self, areas: Areas | None = None, *, bisections: int = EDGE_BISECTIONS) -> Region:
         nodes = sorted((i, j) for i in range(self._x.count) for j in range(self._y.count) if self._known((i, j)))
-        boundary = self._bisected(list(self._edges(nodes)))
-        points = tuple(Point(*self._place(node), self._answers[self._place(node)]) for node in nodes)
+        boundary = self._bisected(list(self._edges(nodes)), bisections)
+        points = tuple(Point(*self._place(node), self._answer(node)) for node in nodes)
         seconds = sum(answer.seconds for answer in self._answers.values())
-        return Region(self._question, self._x, self._y, points, boundary, len(self._answers), seconds)
+        return Region(self._question, self._x, self._y, points, boundary, len(self._answers), seconds, areas)
+
+    def _areas(self, division: Division) -> Areas:
+        proved, undecided = (tuple(map(self._rectangle, cells)) for cells in (division.proved, division.undecided))
+        return Areas(proved, undecided, division.share(division.proved), division.share(division.undecided))
+
+    def _rectangle(self, cell: Cell) -> Rectangle:
+        (left, bottom), (right, top) = self._place(cell.corners[0]), self._place(cell.corners[-1])
+        return Rectangle((left, right), (bottom, top))
 
     def _edges(self, nodes: Sequence[Node]) -> Iterator[tuple[Node, Node]]:
         """Neighbours, feasible first, of which one is feasible and the other is not."""
@@ -231,12 +316,12 @@ class Map:
                     if self._feasible(one) and not self._feasible(two):
                         yield one, two
 
-    def _bisected(self, edges: Sequence[tuple[Node, Node]]) -> tuple[Crossing, ...]:
+    def _bisected(self, edges: Sequence[tuple[Node, Node]], bisections: int) -> tuple[Crossing, ...]:
         """Halve all edges at once, a fixed number of times: every round is one parallel batch."""
         ends = [(np.array(one, dtype=float), np.array(two, dtype=float)) for one, two in edges]
-        for _ in range(EDGE_BISECTIONS):
+        for _ in range(bisections):
             middles = [0.5 * (good + bad) for good, bad in ends]
-            places = [self._place((float(m[0]), float(m[1]))) for m in middles]
+            places = [(self._place((float(m[0]), float(m[1]))),) for m in middles]
             self._solve_places(places)
             ends = [
                 (m, bad) if self._answers[place].verdict is Verdict.FEASIBLE else (good, m)
@@ -245,33 +330,40 @@ class Map:
         return tuple(Crossing(self._place(tuple(good)), self._place(tuple(bad))) for good, bad in ends)
 
     def _solve(self, nodes: Iterable[Node]) -> None:
-        self._solve_places([self._place(node) for node in nodes])
+        self._solve_places([(self._place(node),) for node in nodes])
 
-    def _solve_places(self, places: Sequence[tuple[float, float]]) -> None:
+    def _solve_places(self, asked: Sequence[Places]) -> None:
         missing = []
-        for place in dict.fromkeys(places):
-            if place in self._answers:
+        for places in dict.fromkeys(asked):
+            if places in self._answers:
                 continue
-            kept = self._memory.get(place)
+            kept = self._memory.get(places)
             if kept is None:
-                missing.append(place)
+                missing.append(places)
             else:
-                self._answers[place] = kept
+                self._answers[places] = kept
         total = len(self._answers) + len(missing)
-        tasks = [Task(self._question, (self._x.name, self._y.name), place) for place in missing]
-        for place, answer in zip(missing, self._solver(tasks), strict=True):
-            self._answers[place] = answer
-            self._memory.put(place, answer)
+        tasks = [Task(self._question, self._swept, places) for places in missing]
+        for places, answer in zip(missing, self._solver(tasks), strict=True):
+            self._answers[places] = answer
+            self._memory.put(places, answer)
             self._progress(len(self._answers), total)
+
+    @property
+    def _swept(self) -> tuple[str, str]:
+        return self._x.name, self._y.name
 
     def _place(self, node: tuple[float, float]) -> tuple[float, float]:
         return self._x.at(node[0]), self._y.at(node[1])
 
     def _known(self, node: Node) -> bool:
-        return self._place(node) in self._answers
+        return (self._place(node),) in self._answers
+
+    def _answer(self, node: Node) -> Answer:
+        return self._answers[(self._place(node),)]
 
     def _verdict(self, node: Node) -> Verdict:
-        return self._answers[self._place(node)].verdict
+        return self._answer(node).verdict
 
     def _feasible(self, node: Node) -> bool:
         return self._verdict(node) is Verdict.FEASIBLE
