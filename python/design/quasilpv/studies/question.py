@@ -160,13 +160,14 @@ class Sweep:
             return error.got
         return None
 
-    def common(self, points: Sequence[Mapping[str, float]]) -> Answer:
+    def common(self, points: Sequence[Mapping[str, float]], *, rescaled: bool = True) -> Answer:
         """One solution for several points: it holds in their whole convex hull (`quasilpv.lmi.common`).
 
         A verdict other than feasible says nothing about any point.
 
         Args:
             points: values for every swept parameter.
+            rescaled: if there is none in the units of the system, look for one in others too.
 
         Raises:
             ValueError: the data are not affine in the swept parameters.
@@ -174,7 +175,7 @@ class Sweep:
         start = time.perf_counter()
         compiled = self._problem(points)
         decision, units = decide(compiled), None
-        if not decision.feasible and self._units is not None:
+        if rescaled and not decision.feasible and self._units is not None:
             decision, units = decide(self._problem(points, self._units)), self._units
         proves = decision.feasible and self._refused(points) is None
         finding = solution(decision, 1, units=units) if proves else no_solution(decision)

@@ -171,11 +171,13 @@ class Task:
         question: of the map.
         swept: names of the parameters that change.
         places: their values, at one point or at several.
+        rescaled: whether a solution for several is looked for in other units too.
     """
 
     question: Question
     swept: tuple[str, ...]
     places: Places
+    rescaled: bool = False
 
     @property
     def points(self) -> list[dict[str, float]]:
@@ -200,7 +202,7 @@ class Memory(Protocol):
 def solve_task(task: Task) -> Answer:
     """Answer one task; a process compiles a family once for all the tasks it is given."""
     sweep, points = sweep_of(task.question, task.swept), task.points
-    return sweep.at(points[0]) if len(points) == 1 else sweep.common(points)
+    return sweep.at(points[0]) if len(points) == 1 else sweep.common(points, rescaled=task.rescaled)
 
 
 @lru_cache(maxsize=4)
@@ -284,12 +286,12 @@ class Map:
         missed.
         """
         columns, rows = _coarse(self._x.count), _coarse(self._y.count)
-        cells = [(i, j, k, m) for i, k in pairwise(columns) for j, m in pairwise(rows)]
+        cells = [Cell(i, j, k, m) for i, k in pairwise(columns) for j, m in pairwise(rows)]
         self._solve([(i, j) for i in columns for j in rows])
         while cells:
-            mixed = [cell for cell in cells if len({self._verdict(n) for n in _corners(cell)}) > 1]
-            cells = [part for cell in mixed for part in _quarters(cell)]
-            self._solve([node for cell in cells for node in _corners(cell)])
+            mixed = [cell for cell in cells if len({self._verdict(n) for n in cell.corners}) > 1]
+            cells = [part for cell in mixed for part in cell.quarters()]
+            self._solve([node for cell in cells for node in cell.corners])
         return self._region()
 
     def _region(self, areas: Areas | None = None, *, bisections: int = EDGE_BISECTIONS) -> Region:
@@ -343,11 +345,15 @@ class Map:
             else:
                 self._answers[places] = kept
         total = len(self._answers) + len(missing)
-        tasks = [Task(self._question, self._swept, places) for places in missing]
+        tasks = [Task(self._question, self._swept, places, self._was_rescaled(places)) for places in missing]
         for places, answer in zip(missing, self._solver(tasks), strict=True):
             self._answers[places] = answer
             self._memory.put(places, answer)
             self._progress(len(self._answers), total)
+
+    def _was_rescaled(self, places: Places) -> bool:
+        """Whether one of the places is known to be feasible in other units."""
+        return any(self._answers[(p,)].units is not None for p in places if (p,) in self._answers)
 
     @property
     def _swept(self) -> tuple[str, str]:
@@ -375,21 +381,6 @@ def _coarse(count: int) -> list[int]:
     while stride > 1 and stride * COARSE_CELLS > count - 1:
         stride //= 2
     return sorted({*range(0, count, stride), count - 1})
-
-
-def _corners(cell: tuple[int, int, int, int]) -> tuple[Node, Node, Node, Node]:
-    i, j, k, m = cell
-    return (i, j), (k, j), (i, m), (k, m)
-
-
-def _quarters(cell: tuple[int, int, int, int]) -> list[tuple[int, int, int, int]]:
-    """The cell cut at its middle indices; nothing if it has no inner grid line."""
-    i, j, k, m = cell
-    if k - i <= 1 and m - j <= 1:
-        return []
-    columns = [(i, k)] if k - i <= 1 else [(i, (i + k) // 2), ((i + k) // 2, k)]
-    rows = [(j, m)] if m - j <= 1 else [(j, (j + m) // 2), ((j + m) // 2, m)]
-    return [(a, c, b, d) for a, b in columns for c, d in rows]
 
 
 def counts(region: Region) -> Mapping[Verdict, int]:
