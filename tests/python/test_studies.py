@@ -24,6 +24,9 @@ from quasilpv.studies.engines import in_processes, on_cluster
 from quasilpv.studies.region import Axis, Map, Region, Task, counts, solve_task
 
 QUESTION = Question("ex-I.1", "II.6")
+REFUTED = ("infeasible", "proved")
+"""What is proved again when a map is resumed."""
+
 X, Y = Axis("a", -2.0, 6.0, 5), Axis("b", -4.0, 8.0, 9)
 
 
@@ -219,7 +222,9 @@ def test_areas_interrupted_and_resumed_equal_those_that_were_not(area_map: Regio
     first = make_map(memory=Checkpoint(tmp_path, QUESTION, ("a", "b"))).areas()
     (kept,) = tmp_path.iterdir()
     lines = kept.read_bytes().splitlines(keepends=True)
-    kept.write_bytes(b"".join(lines[: len(lines) * 2 // 3]) + lines[-1][:40])
+    left = lines[: len(lines) * 2 // 3]
+    kept.write_bytes(b"".join(left) + lines[-1][:40])
+    believed = [entry for entry in map(json.loads, left[1:]) if (entry["verdict"], entry["evidence"]) != REFUTED]
     solved: list[Task] = []
 
     def counting(tasks: Sequence[Task]) -> Iterable[Answer]:
@@ -229,7 +234,7 @@ def test_areas_interrupted_and_resumed_equal_those_that_were_not(area_map: Regio
     memory = Checkpoint(tmp_path, QUESTION, ("a", "b"))
     resumed = make_map(memory=memory, solver=counting).areas()
     assert without_times(resumed) == without_times(first) == without_times(area_map)
-    assert len(solved) == first.evaluations - (len(lines) * 2 // 3 - 1) > 0
+    assert len(solved) == first.evaluations - len(believed) > 0
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 """From a design to the artifact that is shipped: programs compiled, claims checked, evidence attached, one object.
 
-The only room that knows both how a law is designed and how an artifact is written. Nothing leaves it whose claims do
-not hold in exact arithmetic or that fails its robust gate, unless that is asked for; then the artifact says so.
+The only room that knows both how a law is designed and how an artifact is written. Nothing leaves it whose claims are
+not proved or that fails its robust gate, unless that is asked for; then the artifact says so.
 """
 
 from __future__ import annotations
@@ -17,12 +17,21 @@ from quasilpv import __version__
 from quasilpv.artifact import Artifact, Program
 from quasilpv.artifact.canonical import document_hash
 from quasilpv.artifact.compilation import compile_program
-from quasilpv.certificate import CHECKERS, gate, verify
+from quasilpv.certificate import CHECKERS, Evidence, gate, verify
 from quasilpv.errors import ClaimError
 from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, TrackingDesign, synthesise, without_compensation
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.baselines import reference_speeds
 from quasilpv.systems.registry import Robot, robot
+
+NEEDED_OF_CLAIMS = Evidence.ENCLOSED
+"""Every claim of a released artifact is proved; a sampled one does not suffice."""
+
+NEEDED_OF_GATE: Mapping[str, Evidence] = {"dob-acceleration": Evidence.ENCLOSED}
+"""What the robust gate of a law kind has to rest on; for kinds without an entry a grid suffices, and is called one."""
+
+VERIFICATION_VERSION = 2
+"""Of the member ``verification``; 1, which had no number, did not tell kinds of evidence apart."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +85,7 @@ def checked_artifact(design: TrackingDesign, allow_unverified: bool = False) -> 
         allow_unverified: do not refuse, but write ``"released_unverified": true`` into the artifact.
 
     Raises:
-        ClaimError: a claim does not hold, or the robust gate is not passed.
+        ClaimError: a claim does not hold or is not proved, or the robust gate is not passed.
     """
     content = to_artifact(design).content()
     if design.law["kind"] not in CHECKERS:
@@ -84,13 +93,24 @@ def checked_artifact(design: TrackingDesign, allow_unverified: bool = False) -> 
     verdict = verify(content, content["name"])
     samples = float(design.inputs["specification"]["delay_samples"])
     found = gate(content, content["name"], fmpq(*samples.as_integer_ratio())).to_document()
-    failures = [f"{name}: does not hold in exact arithmetic" for name in verdict.failed]
+    of_gate = NEEDED_OF_GATE.get(design.law["kind"], Evidence.SAMPLED)
+    failures = [f"{claim.name}: does not hold ({claim.evidence})" for claim in verdict.claims if not claim.holds]
+    for claim in verdict.weaker_than(NEEDED_OF_CLAIMS):
+        failures.append(f"{claim.name}: {claim.evidence}, {NEEDED_OF_CLAIMS} evidence is needed")
     if not found["passed"]:
         failures.append(_why_not_passed(found))
+    elif not Evidence(found["evidence"]).is_at_least(of_gate):
+        failures.append(f"robust gate: {found['evidence']}, {of_gate} evidence is needed")
     if failures and not allow_unverified:
         more = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
         raise ClaimError(f"{content['name']}: not released: {failures[0]}{more}")
-    evidence = {**(content["verification"] or {}), "certificate": verdict.findings(), "gate": found}
+    evidence = {
+        **(content["verification"] or {}),
+        "schema_version": VERIFICATION_VERSION,
+        "needed_evidence": {"claims": NEEDED_OF_CLAIMS.value, "gate": of_gate.value},
+        "certificate": verdict.findings(),
+        "gate": found,
+    }
     if failures:
         evidence["released_unverified"] = True
     return Artifact.from_document({**content, "verification": evidence})

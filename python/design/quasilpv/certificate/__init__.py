@@ -1,4 +1,4 @@
-"""An independent, small checker: every claim of an artifact, rebuilt from its data and decided in exact arithmetic.
+"""An independent, small checker: every claim of an artifact, rebuilt from its data and decided, with its evidence.
 
 It shares no LMI vocabulary, no conditions and no solver with the rooms that make a design (the grid gate of
 torque-level laws, which proves nothing, uses the loops the design searches with). It reads the artifact as a plain
@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from flint import fmpq
 
-from quasilpv.certificate.claims import Claim, Verification
+from quasilpv.certificate.claims import Claim, Evidence, Verification
 from quasilpv.certificate.design_model import check_design_model
 from quasilpv.certificate.gate import RobustGate, robust_gate
 from quasilpv.certificate.gate_data import HALF_A_SAMPLE, law_kind
@@ -28,7 +28,7 @@ from quasilpv.certificate.stabilising_laws import (
 from quasilpv.certificate.torque_law import check_dob_torque
 from quasilpv.errors import InputError
 
-__all__ = ["CHECKERS", "GATES", "Claim", "Gate", "Verification", "gate", "verify"]
+__all__ = ["CHECKERS", "GATES", "Claim", "Evidence", "Gate", "Verification", "gate", "verify"]
 
 Checker: TypeAlias = Callable[[Mapping[str, Any]], tuple[Claim, ...]]
 Gate: TypeAlias = RobustGate | GridGate

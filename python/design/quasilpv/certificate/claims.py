@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -13,25 +14,83 @@ from flint import fmpq, fmpq_mat
 from quasilpv.certificate.exact_matrices import is_positive_definite
 
 
+class Evidence(StrEnum):
+    """What the verdict on a claim rests on, the strongest first."""
+
+    EXACT = "exact"
+    """Rational arithmetic on the numbers as shipped: a proof."""
+    ENCLOSED = "enclosed"
+    """Intervals that are guaranteed to hold the true values: a proof."""
+    SAMPLED = "sampled"
+    """Double arithmetic at points: no proof."""
+
+    def is_at_least(self, needed: Evidence) -> bool:
+        """Whether it is as strong as what is needed, or stronger."""
+        order = list(Evidence)
+        return order.index(self) <= order.index(needed)
+
+
 @dataclass(frozen=True)
 class Claim:
-    """One inequality, decided exactly.
+    """One inequality and the verdict on it; made by one of the methods, each of which knows its evidence.
 
     Attributes:
         name: which inequality, e.g. ``"observer: pole disk"``.
-        holds: the exact verdict.
+        holds: the verdict.
         margin: smallest eigenvalue once rows and columns are scaled to a unit diagonal, in double arithmetic and at
-            least -1: how far from the edge, for people, and the same in whatever units.
+            least -1: how far from the edge, for people, and the same in whatever units. Of a claim without a matrix,
+            the part of what is allowed that is left.
+        evidence: what the verdict rests on.
     """
 
     name: str
     holds: bool
     margin: float
+    evidence: Evidence
 
     @classmethod
     def positive(cls, name: str, exact: fmpq_mat) -> Claim:
-        """Decide ``exact > 0``."""
-        return cls(name, is_positive_definite(exact), _margin(exact))
+        """Decide ``exact > 0``.
+
+        Raises:
+            TypeError: the matrix is not one of rationals.
+        """
+        if not isinstance(exact, fmpq_mat):
+            raise TypeError(f"{name}: {type(exact).__name__}, expected a matrix of rationals")
+        return cls(name, is_positive_definite(exact), _margin(exact), Evidence.EXACT)
+
+    @classmethod
+    def at_most(cls, name: str, value: fmpq, limit: fmpq, margin: float | None = None) -> Claim:
+        """Decide ``value <= limit``, both positive.
+
+        Args:
+            name: of the claim.
+            value, limit: rationals.
+            margin: default: ``1 - value / limit``, at least -1.
+
+        Raises:
+            TypeError: they are no rationals.
+        """
+        if not (isinstance(value, fmpq) and isinstance(limit, fmpq)):
+            raise TypeError(f"{name}: {type(value).__name__} and {type(limit).__name__}, expected rationals")
+        left = max(fmpq(-1), 1 - value / limit)
+        return cls(name, value <= limit, int(left.p) / int(left.q) if margin is None else margin, Evidence.EXACT)
+
+    @classmethod
+    def enclosed(cls, name: str, holds: bool, margin: float) -> Claim:
+        """A verdict from guaranteed enclosures."""
+        return cls(name, holds, max(-1.0, margin), Evidence.ENCLOSED)
+
+    @classmethod
+    def sampled(cls, name: str, error: float, tolerance: float) -> Claim:
+        """``error <= tolerance`` at the points looked at, in double arithmetic."""
+        return cls(name, error <= tolerance, max(-1.0, 1.0 - error / tolerance), Evidence.SAMPLED)
+
+    @classmethod
+    def all_of(cls, name: str, claims: Sequence[Claim]) -> Claim:
+        """The claim that all of them hold, with the weakest evidence among them."""
+        weakest = max((claim.evidence for claim in claims), key=list(Evidence).index)
+        return cls(name, all(claim.holds for claim in claims), min(claim.margin for claim in claims), weakest)
 
 
 def all_positive(name: str, numbers: Iterable[fmpq]) -> Claim:
@@ -83,15 +142,30 @@ class Verification:
         return min((claim.margin for claim in self.claims), default=float("nan"))
 
     @property
+    def evidence(self) -> dict[str, int]:
+        """How many claims rest on what: every kind of `Evidence`, the strongest first."""
+        return {kind.value: sum(claim.evidence is kind for claim in self.claims) for kind in Evidence}
+
+    @property
+    def evidence_in_words(self) -> str:
+        """E.g. ``"41 exact, 1 sampled"``."""
+        return ", ".join(f"{number} {kind}" for kind, number in self.evidence.items() if number)
+
+    def weaker_than(self, needed: Evidence) -> tuple[Claim, ...]:
+        """The claims whose evidence does not suffice."""
+        return tuple(claim for claim in self.claims if not claim.evidence.is_at_least(needed))
+
+    @property
     def failed(self) -> tuple[str, ...]:
         """Names of the claims that do not hold."""
         return tuple(claim.name for claim in self.claims if not claim.holds)
 
     def findings(self) -> dict[str, Any]:
-        """JSON-able, the same at every run: verified, lmis, worst_margin, and the claims that fail."""
+        """JSON-able, the same at every run: verified, lmis, evidence, worst_margin, and the claims that fail."""
         return {
             "verified": self.verified,
             "lmis": len(self.claims),
+            "evidence": self.evidence,
             "worst_margin": self.worst_margin,
             "failed": list(self.failed),
         }

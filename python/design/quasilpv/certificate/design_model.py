@@ -21,7 +21,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat
 
-from quasilpv.certificate.claims import Claim
+from quasilpv.certificate.claims import Claim, all_positive
 from quasilpv.certificate.exact_matrices import magnitude, rational, zero
 from quasilpv.certificate.gate_data import inertia_data
 from quasilpv.certificate.gate_inertia import InertiaData, Pair, design_inertia, true_inertia
@@ -54,8 +54,8 @@ def _coverage_claims(data: InertiaData) -> Iterator[Claim]:
         below, above = cosine_range(data, pair)
         lower, upper = rational(data.premise_lower[p]), rational(data.premise_upper[p])
         beyond = max(lower - below, above - upper)
-        margin = 1.0 if beyond <= 0 else max(-1.0, -to_float(beyond / (upper - lower)))
-        yield Claim(f"premise box: {_cosine(data, pair)} on the operating domain", beyond <= 0, margin)
+        margin = 1.0 if beyond <= 0 else -to_float(beyond / (upper - lower))
+        yield Claim.enclosed(f"premise box: {_cosine(data, pair)} on the operating domain", beyond <= 0, margin)
 
 
 def _inertia_claims(data: InertiaData) -> Iterator[Claim]:
@@ -64,7 +64,7 @@ def _inertia_claims(data: InertiaData) -> Iterator[Claim]:
     robot = fmpq_mat(n, n, [nominal[i][j](fmpq(0)) for i, j in product(range(n), repeat=2)])
     scale = table.constant[n - 1, n - 1] / robot[n - 1, n - 1]
     if scale <= 0:
-        yield Claim("inertia table: a positive multiple of the robot's own", False, -1.0)
+        yield all_positive("inertia table: a positive multiple of the robot's own", [scale])
         return
     constant = table.constant - scale * sum((_only(robot, (k, k)) for k in range(n)), zero(n, n))
     for pair in (pair for pair in data.pairs if pair not in table.slopes):
@@ -72,7 +72,7 @@ def _inertia_claims(data: InertiaData) -> Iterator[Claim]:
         held = table.constant[pair] / (scale * robot[pair])
         inside = min(held - below, above - held) / (above - below)
         title = f"inertia table: {_cosine(data, pair)} held at {to_float(held):.4g}, a value it takes"
-        yield Claim(title, inside >= 0, max(-1.0, to_float(inside)))
+        yield Claim.enclosed(title, inside >= 0, to_float(inside))
         constant -= _only(table.constant, pair)
     error = table.rest + magnitude(constant)
     for pair, slope in table.slopes.items():
@@ -86,7 +86,7 @@ def _proportional(scale: fmpq, error: fmpq_mat, robot: fmpq_mat) -> Claim:
     squares = [error[i, j] ** 2 / (robot[i, i] * robot[j, j]) for i, j in entries]
     worst = max(squares) / (scale * ROUNDING) ** 2
     margin = 1.0 - to_float(min(worst, fmpq(4))) ** 0.5
-    return Claim(f"inertia table: {to_float(scale):.6g} times the robot's own", worst <= 1, margin)
+    return Claim.at_most(f"inertia table: {to_float(scale):.6g} times the robot's own", worst, fmpq(1), margin)
 
 
 def _only(square: fmpq_mat, pair: Pair) -> fmpq_mat:

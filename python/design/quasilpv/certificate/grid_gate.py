@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from flint import fmpq
 
+from quasilpv.certificate.claims import Evidence
 from quasilpv.certificate.gate_data import HALF_A_SAMPLE, inertia_data, law_kind
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_range
 from quasilpv.certificate.gate_rationals import to_float
@@ -71,12 +72,18 @@ class GridGate:
         case = max(self.worst, key=lambda name: self.worst[name].growth_rate_per_s)
         return self.worst[case], 0.0 if case == "no_delay" else self.specified_delay_s
 
+    @property
+    def evidence(self) -> Evidence:
+        """Eigenvalues in double arithmetic at the points of a grid."""
+        return Evidence.SAMPLED
+
     def to_document(self) -> dict[str, Any]:
         """JSON-able: what ``design robust --json`` prints. null stands for no value; `proved` is never true."""
         worst, delay_s = self.worst_case
         return {
             "passed": self.passed,
             "proved": False,
+            "evidence": self.evidence.value,
             "inertia_margin": None if self.margin is None else list(self.margin),
             "delay_margin_s": self.delay_margin_s,
             "needed_range": None if self.needed is None else list(self.needed.to_floats()),

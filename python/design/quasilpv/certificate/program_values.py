@@ -1,4 +1,4 @@
-"""Programs of an artifact run on numbers of any kind: doubles, arrays, or balls that enclose a range.
+"""Programs of an artifact run on numbers of any kind: doubles, arrays, balls that enclose a range, or polynomials.
 
 The evaluator of the checker, apart from that of the design (``docs/reference/formats.md``, "Programs").
 """
@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 from flint import arb
+
+from quasilpv.certificate.trigonometric import Polynomial, UnsupportedError
 
 Scalar = Any
 Code = Sequence[Sequence[Any]]
@@ -30,6 +32,8 @@ SINC_RADIUS = 0.01
 
 
 def _sinc(x: Scalar) -> Scalar:
+    if isinstance(x, Polynomial):
+        return x.sinc()
     if not isinstance(x, arb):
         return np.sinc(x / np.pi)
     pieces = math.ceil(float(x.rad()) / SINC_RADIUS)
@@ -41,7 +45,12 @@ def _sinc(x: Scalar) -> Scalar:
 
 
 def _unary(name: str) -> Callable[[Scalar], Scalar]:
-    return lambda x: getattr(x, name)() if isinstance(x, arb) else getattr(np, name)(x)
+    def apply(x: Scalar) -> Scalar:
+        if isinstance(x, Polynomial) and not hasattr(x, name):
+            raise UnsupportedError(f"{name} of an angle or a speed")
+        return getattr(x, name)() if isinstance(x, arb | Polynomial) else getattr(np, name)(x)
+
+    return apply
 
 
 _UNARY: Mapping[str, Callable[[Scalar], Scalar]] = {
@@ -56,10 +65,11 @@ def program_values(program: Mapping[str, Any], angle: Sequence[Scalar], speed: S
 
     Args:
         program: of an artifact.
-        angle, speed: n values each, all of one kind: numbers, arrays of one shape, or `flint.arb` balls.
+        angle, speed: n values each, all of one kind: numbers, arrays of one shape, `flint.arb` balls, or polynomials.
 
     Raises:
         KeyError: an operation that no premise of an arm needs (arcs), or a reference.
+        UnsupportedError: of polynomials, what is none.
     """
     inputs = {"angle": angle, "speed": speed}
     stack: list[Scalar] = []

@@ -163,8 +163,7 @@ def _bounds(witness: Mapping[str, Any]) -> list[fmpq]:
 
 def _positive_at_all(name: str, matrices: Sequence[fmpq_mat]) -> Claim:
     """The claim that all these matrices, one per filter pole, are positive definite."""
-    claims = [Claim.positive(name, exact) for exact in matrices]
-    return Claim(name, all(claim.holds for claim in claims), min(claim.margin for claim in claims))
+    return Claim.all_of(name, [Claim.positive(name, exact) for exact in matrices])
 
 
 def _within_torque(document: Mapping[str, Any], witness: Mapping[str, Any], share: fmpq) -> Claim:

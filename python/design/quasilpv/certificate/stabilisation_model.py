@@ -5,28 +5,34 @@ premises of the program ``schedule``. Two claims tie it to the robot:
 
 * **premise box** (proved): every output of the program, enclosed in ball arithmetic over a subdivision of the operating
   domain of angles and speeds, lies in the box the run-time side clamps it to.
-* **equations of motion** (sampled): at random states of the domain the tables give the robot's own inertia, and its
-  torque ``N omega + G``, within `ROUNDING`. Both sides are sums of few analytic terms, so that another model would
-  be found out at almost every state; a proof it is not.
+* **equations of motion**: the tables give the robot's own inertia, and its torque ``N omega + G``, within `ROUNDING`.
+  Premises and equations are written as polynomials in angles, speeds, sines, cosines and sinc with the rational numbers
+  that are shipped (`trigonometric`); the coefficients of the difference bound the error over the whole domain, exactly.
+  If a premise is something else, both sides are compared at random states in double arithmetic instead: sampled.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from flint import arb
+from flint import arb, fmpq
 
 from quasilpv.certificate.claims import Claim
+from quasilpv.certificate.equations_of_motion import EquationsOfMotion, gravity_moments, largest_state
+from quasilpv.certificate.exact_matrices import identity, stack, zero
 from quasilpv.certificate.program_values import program_values
-from quasilpv.certificate.robot_dynamics import gravity_stiffness, robot_dynamics
+from quasilpv.certificate.robot_dynamics import robot_dynamics
+from quasilpv.certificate.trigonometric import Polynomial, UnsupportedError
 from quasilpv.certificate.vertex_tables import VertexTable
 
 FloatArray = npt.NDArray[np.float64]
 
 ROUNDING = 1e-9
+ROUNDING_EXACTLY = fmpq(1, 10**9)
 STATES = 64
 LARGEST_SUBDIVISION = 200_000
 _SEED = 2022
@@ -74,7 +80,7 @@ def _premise_claim(
     title = f"premise box: {output} on the operating domain"
     for _ in range(LARGEST_SUBDIVISION):
         if not pending:
-            return Claim(title, True, 1.0)
+            return Claim.enclosed(title, holds=True, margin=1.0)
         piece = pending.pop()
         value = _enclosure(program, piece)
         if value.lower() >= box[0] and value.upper() <= box[1]:
@@ -87,7 +93,7 @@ def _premise_claim(
         low, high = piece[widest]
         for half in ((low, (low + high) / 2.0), ((low + high) / 2.0, high)):
             pending.append([half if k == widest else interval for k, interval in enumerate(piece)])
-    return Claim(title, False, -1.0)
+    return Claim.enclosed(title, holds=False, margin=-1.0)
 
 
 _INPUTS = ("angle", "speed")
@@ -102,7 +108,80 @@ def _enclosure(program: Mapping[str, Any], piece: Sequence[tuple[float, float]])
 
 
 def equations_of_motion_claim(document: Mapping[str, Any], E: VertexTable, A: VertexTable) -> Claim:
-    """The claim that ``E(z) = diag(I, M)`` and ``A(z) x = (omega, -N omega - G)`` at random states of the domain."""
+    """The claim that ``E(z) = diag(I, M)`` and ``A(z) x = (omega, -N omega - G)`` on the operating domain."""
+    try:
+        robot, reach = EquationsOfMotion.of(document), largest_state(document)
+        inertia = _inertia_error(document, E, robot, reach)
+        n = len(robot.torque)
+        theta, omega = Polynomial.variables(n)
+        state = [*theta, *omega]
+        expected = [*omega, *(-torque for torque in robot.torque)]
+        drift = [
+            sum((entry * x for entry, x in zip(row, state, strict=True)), Polynomial.number(n, 0))
+            for row in _on_trajectories(document, A, n)
+        ]
+        error = max((found - wanted).bound(reach) for found, wanted in zip(drift, expected, strict=True))
+    except UnsupportedError:
+        return _sampled_equations(document, E, A)
+    return Claim.at_most(
+        "design model: the robot's equations of motion", max(inertia, error / robot.torque_scale), ROUNDING_EXACTLY
+    )
+
+
+def linearisation_claim(document: Mapping[str, Any], E: VertexTable, A: VertexTable) -> Claim:
+    """The claim that A is the robot's at rest, ``[0, I; -H(0), -N(0, 0)]``, and ``E(z) = diag(I, M)``.
+
+    What gravity and Coriolis torque are beyond that is a disturbance to the law.
+    """
+    try:
+        robot, reach = EquationsOfMotion.of(document), largest_state(document)
+        inertia = _inertia_error(document, E, robot, reach)
+        n = len(robot.torque)
+        expected = stack([[zero(n, n), identity(n)], [-robot.stiffness, -robot.friction]]).table()
+        found = _on_trajectories(document, A, n)
+        error = max((found[i][j] - expected[i][j]).bound(reach) for i, j in product(range(2 * n), repeat=2))
+    except UnsupportedError:
+        return _sampled_linearisation(document, E, A)
+    return Claim.at_most(
+        "design model: the robot's inertia, linearised at rest otherwise",
+        max(inertia, error / robot.torque_scale),
+        ROUNDING_EXACTLY,
+    )
+
+
+def _inertia_error(
+    document: Mapping[str, Any], E: VertexTable, robot: EquationsOfMotion, reach: Sequence[fmpq]
+) -> fmpq:
+    """Bound of ``|E(z) - diag(I, M)|`` over all entries, those of M relative to its size."""
+    n = len(robot.torque)
+    found = _on_trajectories(document, E, n)
+    worst = fmpq(0)
+    for i, j in product(range(2 * n), repeat=2):
+        of_robot = i >= n and j >= n
+        wanted = robot.inertia[i - n][j - n] if of_robot else fmpq(int(i == j))
+        worst = max(worst, (found[i][j] - wanted).bound(reach) / (robot.inertia_scale if of_robot else 1))
+    return worst
+
+
+def _on_trajectories(document: Mapping[str, Any], table: VertexTable, n: int) -> list[list[Polynomial]]:
+    """``X(z(theta, omega))``, entry by entry; inside the box of the premises, where they are by another claim."""
+    premises = program_values(document["programs"]["schedule"], *Polynomial.variables(n))
+    if len(premises) != len(table.lower):
+        raise ValueError(f"{len(premises)} outputs of the program schedule, {len(table.lower)} premises")
+    size = 2 * n
+    total = [[Polynomial.number(n, 0)] * size for _ in range(size)]
+    for factors, coefficient in table.monomials().items():
+        value = Polynomial.number(n, 1)
+        for p in factors:
+            value = value * premises[p]
+        for i, j in product(range(size), repeat=2):
+            if coefficient[i, j] != 0:
+                total[i][j] = total[i][j] + value * coefficient[i, j]
+    return total
+
+
+def _sampled_equations(document: Mapping[str, Any], E: VertexTable, A: VertexTable) -> Claim:
+    """`equations_of_motion_claim` at random states of the domain."""
     rng = np.random.default_rng(_SEED)
     theta, omega = (
         np.column_stack([rng.uniform(low, high, STATES) for low, high in document["domain"][field]])
@@ -119,14 +198,11 @@ def equations_of_motion_claim(document: Mapping[str, Any], E: VertexTable, A: Ve
         np.abs(drift - np.concatenate([omega, -torque], axis=1)).max() / scale,
     )
     title = f"design model: the robot's equations of motion at {STATES} states (sampled)"
-    return Claim(title, max(errors) <= ROUNDING, max(-1.0, 1.0 - float(max(errors)) / ROUNDING))
+    return Claim.sampled(title, float(max(errors)), ROUNDING)
 
 
-def linearisation_claim(document: Mapping[str, Any], E: VertexTable, A: VertexTable) -> Claim:
-    """The claim that A is the robot's at rest, ``[0, I; -H(0), -N(0, 0)]``, and ``E(z) = diag(I, M)`` is sampled.
-
-    What gravity and Coriolis torque are beyond that is a disturbance to the law.
-    """
+def _sampled_linearisation(document: Mapping[str, Any], E: VertexTable, A: VertexTable) -> Claim:
+    """`linearisation_claim` at random angles of the domain."""
     n = int(document["joints"])
     parameters = document["robot"]["parameters"]
     zero, step = np.zeros((n, n)), 1e-6 * np.eye(n)
@@ -145,14 +221,16 @@ def linearisation_claim(document: Mapping[str, Any], E: VertexTable, A: VertexTa
         np.abs(found[:, :n, :n] - np.eye(n)).max() + np.abs(found[:, :n, n:]).max() + np.abs(found[:, n:, :n]).max(),
     )
     title = f"design model: the robot's inertia at {STATES} states (sampled), linearised at rest otherwise"
-    return Claim(title, max(errors) <= ROUNDING, max(-1.0, 1.0 - float(max(errors)) / ROUNDING))
+    return Claim.sampled(title, float(max(errors)), ROUNDING)
 
 
 def payload_claim(document: Mapping[str, Any]) -> Claim:
-    """The claim that a payload changes the robot's inertia only: its gravity torque (or spring) is the nominal one."""
-    low, high = np.array(document["domain"]["angle_rad"], dtype=float).T
-    angles = np.linspace(low, high, STATES)
-    nominal, *others = (gravity_stiffness(document, angles, fraction) for fraction in (0.0, 0.5, 1.0))
-    error = max(float(np.abs(other - nominal).max()) for other in others) / max(1.0, float(np.abs(nominal).max()))
-    title = f"design model: a payload changes the inertia only, at {STATES} postures (sampled)"
-    return Claim(title, error <= ROUNDING, max(-1.0, 1.0 - error / ROUNDING))
+    """The claim that a payload changes the robot's inertia only: its gravity torque (or spring) is the nominal one.
+
+    Every first moment is a polynomial in the payload fraction f; on [0, 1] its change is at most the sum of the
+    coefficients of f, f^2, ... in magnitude.
+    """
+    moments = gravity_moments(document)
+    change = max((sum((abs(x) for x in moment.coeffs()[1:]), fmpq(0)) for moment in moments), default=fmpq(0))
+    size = max([fmpq(1), *(abs(moment(fmpq(0))) for moment in moments)])
+    return Claim.at_most("design model: a payload changes the inertia only", change / size, ROUNDING_EXACTLY)

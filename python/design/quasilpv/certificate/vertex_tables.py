@@ -68,6 +68,26 @@ class VertexTable:
         """The vertices X_i, exactly."""
         return tuple(matrix(vertex) for vertex in self.doubles)
 
+    def monomials(self) -> dict[tuple[int, ...], fmpq_mat]:
+        """``X(z)`` inside the box as a polynomial, exact: the coefficient of every product of premises."""
+        total: dict[tuple[int, ...], fmpq_mat] = {}
+        vertices = iter(self.vertices())
+        for block in self.blocks:
+            terms: dict[tuple[int, ...], list[fmpq_mat]] = {}
+            terms[()] = [next(vertices) / len(self.blocks) for _ in range(2 ** len(block))]
+            for p in block:
+                low, high = rational(self.lower[p]), rational(self.upper[p])
+                split: dict[tuple[int, ...], list[fmpq_mat]] = {}
+                for premises, corners in terms.items():
+                    half = len(corners) // 2
+                    pairs = list(zip(corners[:half], corners[half:], strict=True))
+                    split[premises] = [(below * high - above * low) / (high - low) for below, above in pairs]
+                    split[(*premises, p)] = [(above - below) / (high - low) for below, above in pairs]
+                terms = split
+            for premises, (coefficient,) in terms.items():
+                total[premises] = total[premises] + coefficient if premises in total else coefficient
+        return total
+
     def evaluate(self, premises: FloatArray) -> FloatArray:
         """``X(z)`` in doubles at B premise vectors, (B, p), clamped to the box as at run time; (B, rows, columns)."""
         return np.asarray(np.tensordot(self.weights(premises), np.array(self.doubles), axes=1))
@@ -91,7 +111,7 @@ class VertexTable:
             return ()
         ratio = self.collapse_error()
         title = f"{name} table: collapsed form within {_double(ratio):.1e} of the vertices"
-        return (Claim(title, ratio < COLLAPSE_TOLERANCE, _double(1 - ratio / COLLAPSE_TOLERANCE)),)
+        return (Claim.at_most(title, ratio, COLLAPSE_TOLERANCE),)
 
     def collapse_error(self) -> fmpq:
         """Bound of ``|collapsed - sum of vertices|`` over the box and all entries, each relative to its own size.

@@ -50,7 +50,7 @@ def robust_command(
         print_json(found.to_document())
     else:
         rows, verdict = (_rows(found), _verdict(found)) if isinstance(found, RobustGate) else _grid_answer(found)
-        print_table(str(artifact), ("", ""), rows, left_columns=2)
+        print_table(str(artifact), ("", ""), [*rows, ("evidence", found.evidence.value)], left_columns=2)
         print(verdict)
     if out is not None:
         for path in _draw(found, out):

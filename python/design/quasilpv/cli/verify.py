@@ -1,4 +1,4 @@
-"""``design verify``: every claim of an artifact, decided in exact arithmetic."""
+"""``design verify``: every claim of an artifact, decided again, with what the verdict rests on."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ def verify_command(
     artifact: Annotated[Path, typer.Argument(metavar="ARTIFACT", help="File, JSON or CBOR twin.")],
     json: JsonOption = False,
 ) -> int:
-    """Check every inequality an artifact claims, in exact rational arithmetic, from the artifact alone.
+    """Check every inequality an artifact claims, from the artifact alone.
 
-    Exit code 1 if a claim does not hold. The checker shares no code with the design.
+    Each claim says what its verdict rests on: exact (rational arithmetic), enclosed (guaranteed intervals) or sampled
+    (double arithmetic at points, no proof). Exit code 1 if a claim does not hold. The checker shares no code with the
+    design.
 
     \b
     Example:
@@ -28,8 +30,11 @@ def verify_command(
     if json:
         print_json(verdict.to_document())
     else:
-        rows = [(claim.name, "holds" if claim.holds else "FAILS", f"{claim.margin:.2e}") for claim in verdict.claims]
-        print_table(str(artifact), ("inequality", "", "margin"), rows, left_columns=2)
+        rows = [
+            (claim.name, "holds" if claim.holds else "FAILS", claim.evidence.value, f"{claim.margin:.2e}")
+            for claim in verdict.claims
+        ]
+        print_table(str(artifact), ("inequality", "", "evidence", "margin"), rows, left_columns=3)
         word = "verified" if verdict.verified else "NOT verified"
-        print(f"{word}: {len(verdict.claims)} inequalities in {verdict.seconds:.3f} s, exact arithmetic")
+        print(f"{word}: {len(verdict.claims)} inequalities, {verdict.evidence_in_words}, in {verdict.seconds:.3f} s")
     return 0 if verdict.verified else 1
