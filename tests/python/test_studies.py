@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import quasilpv as ql
 from quasilpv.cli import run
 from quasilpv.conditions.condition import Options
 from quasilpv.errors import InputError
@@ -201,6 +202,13 @@ def test_processes_and_direction_of_an_axis_do_not_change_areas(area_map: Region
     assert turned.areas is not None
     assert area_map.areas is not None
     assert turned.areas.proved_share == pytest.approx(area_map.areas.proved_share, abs=2.0 / 32.0)
+
+
+def test_the_front_door_proves_areas_where_it_can() -> None:
+    found = ql.region("ex-I.1", "II.6", ("a", -1.0, 0.0, 3), ("b", -1.0, 0.0, 3))
+    assert found.areas is not None
+    assert (found.areas.proved_share, len(found.areas.proved)) == (1.0, 1)
+    assert ql.region("ex-I.1", "II.6", ("a", -1.0, 0.0, 2), ("b", -1.0, 0.0, 2), grid=True).areas is None
 
 
 @pytest.mark.parametrize(

@@ -82,10 +82,13 @@ def region(
 ) -> Region:
     """A map of where a condition is feasible over two parameters.
 
+    Of areas, each proved by one solution, where the data are affine in both; of points elsewhere, and then nothing is
+    known between them (`Region.areas` is None).
+
     Args:
         system, condition, options: as for `solve`.
         x, y: name of a parameter, first and last value, number of values, e.g. ``("a", -8.0, 8.0, 17)``.
-        grid: every point of the grid, instead of what is needed to tell where the condition holds.
+        grid: every point of the grid and no areas, instead of what is needed to tell where the condition holds.
         processes: how many solve at once; systems of the running program travel to them by value.
 
     Raises:
@@ -102,7 +105,9 @@ def region(
         memory=Forgetful(),
         progress=lambda done, total: None,
     )
-    return survey.full() if grid else survey.adaptive()
+    if grid:
+        return survey.full()
+    return survey.areas() if survey.proves_areas else survey.adaptive()
 
 
 def question(system: SystemLike, condition: str, **options: Unpack[QuestionOptions]) -> Question:
