@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
+import re
 import signal
 import socket
 import stat
@@ -17,6 +19,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import quasilpv
 from quasilpv.errors import InputError
 from quasilpv.files import (
     MAX_FILE_BYTES,
@@ -51,6 +54,46 @@ def write(request: pytest.FixtureRequest) -> Write:
 
 def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
+
+
+PACKAGE = Path(quasilpv.__file__).parent
+WRITING_CALLS = {"write_text", "write_bytes", "savefig", "NamedTemporaryFile", "mkstemp", "copy", "copyfile", "move"}
+OWN_WAY = {
+    "files": "the writer",
+    "cli/streams.py": "opens the null device",
+    "figures/style.py": "images are drawn into memory",
+    "studies/checkpoint.py": "appends answers as they come",
+}
+"""Parts of the package that may call what writes, and why."""
+
+
+def calls_that_write(source: str) -> list[str]:
+    """Calls in a source that make, change or open a file for writing."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Call):
+            continue
+        name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+        modes = [argument.value for argument in node.args if isinstance(argument, ast.Constant)]
+        modes += [keyword.value.value for keyword in node.keywords if isinstance(keyword.value, ast.Constant)]
+        opens = name == "open" and any(re.fullmatch("[rbt]*[wax+][rbt+]*", str(mode)) for mode in modes)
+        module = getattr(getattr(node.func, "value", None), "id", "")
+        if opens or (name in WRITING_CALLS and (name not in {"copy", "move"} or module == "shutil")):
+            found.append(f"{node.lineno}: {name}")
+    return found
+
+
+def test_nothing_in_the_package_writes_a_file_but_the_one_writer() -> None:
+    assert calls_that_write("Path('x').write_text('')") == ["1: write_text"]
+    assert calls_that_write("open('name', 'ab')") == calls_that_write("path.open(mode='r+b')") == ["1: open"]
+    assert calls_that_write("open('name', 'rb')") == []
+    others = {
+        str(path.relative_to(PACKAGE)): calls
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if (calls := calls_that_write(path.read_text(encoding="utf-8")))
+    }
+    strangers = {name: calls for name, calls in others.items() if not any(name.startswith(own) for own in OWN_WAY)}
+    assert strangers == {}
 
 
 # ---- what is replaced ------------------------------------------------------------------------------------------------

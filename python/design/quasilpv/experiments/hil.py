@@ -142,6 +142,8 @@ def run_over_lcm(
     if mode == "realtime":
         commands = {name: [*command, *(real_time or RealTimeOptions()).of(name)] for name, command in commands.items()}
     limit_s = LOCK_STEP_LIMIT_S if mode == "lockstep" else experiment.trajectory.duration_s + 4 * SILENCE_S
+    if log:  # the log in this place is of this run or there is none: never that of a run before it that went well
+        (folder / LOG_NAME).unlink(missing_ok=True)
     documents = run_documents(mode, files, experiment, artifact, variant or variant_of(artifact, sensors))
     with Recorder(url, folder / LOG_NAME, documents) if log else nullcontext() as recorder:
         reports, said = _run_both(commands, limit_s)
