@@ -10,38 +10,32 @@ power the bus oscillates unless the source voltage is controlled. In deviations 
 
 The load is an algebraic equation, the capacitance makes E depend on the state, and the controller does not know P.
 
-Run it: python examples/own_system.py
+Run it: python examples/own_system.py. Ask it: design solve examples/own_system.py:dc_bus --condition II.5
+--representation uncertain --decay 5. The same bus as a document of equations, without code: examples/dc_bus.json.
 """
 
 from __future__ import annotations
 
 import numpy as np
-import sympy as sp
 
 from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.equations import rate
 from quasilpv.systems.structure import structure_report
-
-BUS_V = 48.0
-RESISTANCE_OHM, INDUCTANCE_H = sp.Rational("0.05"), sp.Rational("0.002")
-CAPACITANCE_F, CAPACITANCE_PER_V = sp.Rational("0.005"), sp.Rational("0.00005")
 
 
 def dc_bus(deviation_max_v: float = 12.0, power_w: tuple[float, float] = (200.0, 600.0)) -> DescriptorSystem:
     """The bus while its voltage stays within `deviation_max_v` of 48 V, for every load power in an interval."""
-    current, voltage, load, source, power = sp.symbols("i v j u P", real=True)
     return DescriptorSystem.from_equations(
         [
-            sp.Eq(INDUCTANCE_H * rate(current), -RESISTANCE_OHM * current - voltage + source),
-            sp.Eq((CAPACITANCE_F + CAPACITANCE_PER_V * voltage) * rate(voltage), current - load),
-            (BUS_V + voltage) * load + power / BUS_V * voltage,
+            "0.002*i' = -0.05*i - v + u",
+            "(0.005 + 0.00005*v)*v' = i - j",
+            "(48 + v)*j + P/48*v = 0",
         ],
         name="dc-bus",
-        state=(current, voltage, load),
-        inputs=(source,),
-        outputs=(current, voltage),
-        domain={voltage: (-deviation_max_v, deviation_max_v), power: power_w},
-        unknown=(power,),
+        state="i v j",
+        inputs="u",
+        outputs=["i", "v"],
+        domain={"v": (-deviation_max_v, deviation_max_v), "P": power_w},
+        unknown="P",
     )
 
 

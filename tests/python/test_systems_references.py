@@ -183,6 +183,87 @@ def test_the_list_shows_why_a_package_cannot_be_loaded(
     assert "ModuleNotFoundError" in listed["broken"]
 
 
+# ---- documents -------------------------------------------------------------------------------------------------------
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DOCUMENT = {
+    "schema": "quasilpv.system",
+    "schema_version": 1,
+    "name": "oscillator",
+    "parameters": {"r": 0.5, "d": {"default": 0.2, "summary": "damping", "unit": "1/s"}},
+    "state": ["x", "v"],
+    "equations": ["x' = v", "v' = -(1 + p/2)*x - d*v"],
+    "domain": {"p": ["-r", "r"]},
+    "unknown": ["p"],
+}
+
+
+def written(folder: Path, **changes: object) -> str:
+    path = folder / "own.json"
+    path.write_text(json.dumps({**DOCUMENT, **changes}))
+    return str(path)
+
+
+def test_the_document_of_the_example_is_the_system_of_the_example() -> None:
+    code = system_kind(f"{EXAMPLES}/own_system.py:dc_bus").system(deviation_max_v=6.0)
+    document = system_kind(f"{EXAMPLES}/dc_bus.json").system(deviation_max_v=6.0)
+    assert document.premises == code.premises
+    for field in "EABC":
+        np.testing.assert_array_equal(getattr(document, field).constant, getattr(code, field).constant)
+        np.testing.assert_array_equal(getattr(document, field).coefficients, getattr(code, field).coefficients)
+
+
+def test_a_document_is_a_family_with_its_parameters(folder: Path) -> None:
+    kind = system_kind(written(folder))
+    assert kind.parameters["d"].unit == "1/s"
+    made = kind.system(r=0.25, d=0.1)
+    assert made.premises[0].bounds == (-0.25, 0.25)
+    assert made.A.constant.tolist() == [[0.0, 1.0], [-1.0, -0.1]]  # 0.1 is 1/10 rounded once
+    at_rest = {"equilibrium": {"state": {"x": "r"}}, "domain": {"p": [-1, 1], "x": [-2, 2]}}
+    with pytest.raises(InputError, match=r"oscillator: equation 2: drift at x = 0: got -p/4 - 0.5|drift"):
+        system_kind(written(folder, **at_rest)).system()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"schema": "other"}, r"own.json: schema: got .other."),
+        ({"schema_version": 2}, r"own.json: schema_version: got 2"),
+        ({"extra": 1}, r"own.json: extra: got 1"),
+        ({"name": None}, r"own.json: name: got null"),
+        ({"state": "x v"}, r"own.json: state: got .x v."),
+        ({"state": []}, r"own.json: state"),
+        ({"equations": [1]}, r"own.json: equations.0: got 1"),
+        ({"domain": {"p": [1]}}, r"own.json: domain.p"),
+        ({"domain": {"p": ["-q", "q"]}}, r"own.json: domain of p: column 2: got q"),
+        ({"domain": {"p": ["r", "-r"]}}, r"domain of p: got .*reversed"),
+        ({"parameters": {"r": True}}, r"own.json: parameters.r"),
+        (
+            {"parameters": {"x": 1.0, "r": 1.0, "d": 1.0}},
+            r"own.json: parameters.x: got x, expected a name that is no state",
+        ),
+        ({"equations": ["x' = v", "v' = __import__('os').system('touch owned')"]}, r"equation 2: column 17: got '"),
+        ({"equations": ["x' = v"]}, r"oscillator: equations: got 1 equations, expected 2"),
+    ],
+)
+def test_when_a_document_says_nothing_expect_the_member_named(
+    folder: Path, changes: dict[str, object], words: str
+) -> None:
+    with pytest.raises(InputError, match=words) as raised:
+        system_kind(written(folder, **changes)).system()
+    assert "\n" not in str(raised.value)
+    assert not (folder / "owned").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[1, 2]", b"\xff\xfe", b'{"name": "a", "name": "b"}', b"[" * 100_000])
+def test_when_a_file_is_no_document_expect_one_line(folder: Path, content: bytes) -> None:
+    (folder / "own.json").write_bytes(content)
+    with pytest.raises(InputError, match=r"own.json: "):
+        system_kind("own.json")
+    with pytest.raises(InputError, match=r"none.json: file: got No such file"):
+        system_kind("none.json")
+
+
 @pytest.mark.full
 def test_worker_processes_resolve_a_relative_reference(folder: Path) -> None:
     question = Question("own.py:oscillator", "I.1")

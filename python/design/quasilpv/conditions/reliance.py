@@ -246,10 +246,15 @@ def _euler(model: PolytopicModel) -> _Found:
 
 
 def _domain(model: PolytopicModel) -> _Found:
+    left_over = max(map(abs, model.system.disturbance), default=0.0)
+    beside = f"; a constant disturbance of at most {left_over:.2g} is left out" if left_over else ""
     used = {symbol for premise in model.system.premises for symbol in premise.expression.free_symbols}
     if not used:
-        return Status.PROVED, "the model holds everywhere"
-    return Status.ASSUMED, f"{', '.join(sorted(symbol.name for symbol in used))} stay in it: nothing here proves that"
+        return Status.PROVED, f"the model holds everywhere{beside}"
+    return (
+        Status.ASSUMED,
+        f"{', '.join(sorted(symbol.name for symbol in used))} stay in it: nothing here proves that{beside}",
+    )
 
 
 _CHECKS: Mapping[Reliance, Callable[[PolytopicModel], _Found]] = {
