@@ -111,19 +111,25 @@ def test_when_a_documented_option_does_not_exist_expect_it_found() -> None:
         VERBS["solve"].load("solve").make_context("solve", ["ex-I.1", "--condition", "II.6", "--colour", "red"])
 
 
+def elsewhere_with_examples(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands of pages are given in a clone, and what they write is not to stay there."""
+    (folder / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(folder)
+
+
 QUICK_LINES = sorted({line for page in PAGES for line in console_lines(page) if line.startswith(QUICK_COMMANDS)})
 
 
 @pytest.mark.parametrize("line", QUICK_LINES)
 def test_a_quick_command_of_the_documentation_runs(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+    elsewhere_with_examples(tmp_path, monkeypatch)
     assert_runs(line)
 
 
 @pytest.mark.full
 @pytest.mark.parametrize("name", [str(page.relative_to(ROOT)) for page in with_console(PAGES)])
 def test_the_commands_of_a_page_run_in_their_order(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+    elsewhere_with_examples(tmp_path, monkeypatch)
     for line in console_lines(ROOT / name):
         if not is_skipped(line):
             assert_runs(line)
