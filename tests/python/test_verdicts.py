@@ -334,6 +334,8 @@ def test_a_map_of_a_function_of_parameters(processes: int) -> None:
         )
 
     found = ql.region(scalar, "I.2", ("a", -1.0, 1.0, 3), ("b", 0.0, 1.0, 2), grid=True, processes=processes)
+    assert len(repr(found).splitlines()) <= 10
+    assert "4 feasible, 2 infeasible" in repr(found)
     verdicts = {(point.x, point.y): point.answer.headline for point in found.points}
     reached = dict.fromkeys([(-1.0, 0.0), (-1.0, 1.0), (0.0, 1.0), (1.0, 1.0)], "feasible, proved")
     assert verdicts == reached | dict.fromkeys([(0.0, 0.0), (1.0, 0.0)], "infeasible, proved")

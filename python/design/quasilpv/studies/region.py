@@ -123,7 +123,7 @@ class Areas:
         return document
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Region:
     """A map.
 
@@ -145,6 +145,17 @@ class Region:
     evaluations: int
     seconds: float
     areas: Areas | None = None
+
+    def __repr__(self) -> str:
+        """In a few lines."""
+        found = ", ".join(f"{number} {verdict.value}" for verdict, number in counts(self).items() if number)
+        lines = [
+            f"map of {self.question.condition} over {self.x.name} and {self.y.name}: {len(self.points)} points, {found}"
+        ]
+        if self.areas is not None:
+            proved, undecided = self.areas.proved_share, self.areas.undecided_share
+            lines.append(f"proved {proved:.1%} of the area, undecided {undecided:.1%}")
+        return "\n".join([*lines, f"{self.evaluations} problems solved, {self.seconds:.3g} s"])
 
     def to_document(self) -> dict[str, Any]:
         """JSON-able."""

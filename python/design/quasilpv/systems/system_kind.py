@@ -28,7 +28,7 @@ class Parameter:
     affine: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SystemKind:
     """A parametrised descriptor system. Kinds are the same if id and fingerprint are.
 
@@ -55,6 +55,10 @@ class SystemKind:
         """Take the id for a file name if no other is given."""
         if not self.stem:
             object.__setattr__(self, "stem", self.id)
+
+    def __repr__(self) -> str:
+        """In one line."""
+        return f"SystemKind({self.id!r}, parameters {', '.join(self.parameters) or 'none'})"
 
     def __eq__(self, other: object) -> bool:
         """Whether both stand for the same systems."""
