@@ -18,6 +18,7 @@ from quasilpv.artifact import Artifact, read_artifact
 from quasilpv.artifact.canonical import canonical_json, parse_document, with_hash
 from quasilpv.cli import run
 from quasilpv.cli.verbs import VERBS
+from quasilpv.errors import ClaimError, FaultStop, InfeasibleError, PlantError, QuasilpvError
 from quasilpv.experiments.result import Variant
 from quasilpv.telemetry import read_log
 
@@ -404,3 +405,45 @@ def test_when_interrupted_expect_one_line_and_exit_130(design: Design, monkeypat
     monkeypatch.setattr("quasilpv.cli.synth.release", interrupt)
     outcome = design("synth", "arm3")
     assert (outcome.code, outcome.err) == (130, "error: interrupted\n")
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "outcome"),
+    [
+        (InfeasibleError("no gains"), 1, "infeasible"),
+        (ClaimError("an inequality fails"), 1, "claim fails"),
+        (FaultStop("fault F2 at 0.000 s: plant silent"), 3, "fault"),
+        (QuasilpvError("of no kind"), 70, None),
+        (PlantError("singular"), 6, None),
+    ],
+)
+def test_when_a_verb_ends_without_its_answer_expect_json_to_tell_which_outcome_it_was(
+    error: QuasilpvError, code: int, outcome: str | None, design: Design, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("quasilpv.cli.synth.release", fail)
+    ended = design("synth", "arm3", "--json")
+    assert (ended.code, ended.err) == (code, f"error: {error}\n")
+    assert ended.out == "" if outcome is None else json.loads(ended.out) == {"outcome": outcome, "reason": str(error)}
+    assert design("synth", "arm3").out == ""
+
+
+@pytest.mark.parametrize("mistake", ["raise MemoryError", "f = lambda: f(); f()"])
+def test_when_the_program_is_wrong_expect_one_line_a_code_of_its_own_and_the_traceback_on_demand(mistake: str) -> None:
+    program = f"""
+from quasilpv.cli import app
+def wrong(**_):
+    {mistake}
+app.app = wrong
+app.main()
+"""
+    for variables, tells in (({}, False), ({"QUASILPV_TRACEBACK": "1"}, True)):
+        environment = {**os.environ, **variables}
+        command = [sys.executable, "-c", program]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stdout) == (70, "")
+        assert ("Traceback" in done.stderr) == tells
+        assert done.stderr.splitlines()[-1].startswith("error: ")
+        assert tells or done.stderr.count("\n") == 1
