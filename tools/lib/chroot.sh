@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # chroot.sh SYSTEM COMMAND...: runs a command as root in the Debian system of that folder. What it mounts there and
-# what it starts is in namespaces of its own: both end with it, however it ends, and the machine never sees the mounts.
+# what it starts is in namespaces of its own: both end with it and with who called it, however they end, and the machine
+# never sees the mounts.
 #
 # HOST_FOLDERS: pairs FOLDER:FOLDER_INSIDE, one a line, of folders of this machine that are there too.
 set -euo pipefail
 
 if [[ $1 != --inside ]]; then
-  exec unshare --mount --pid --fork --kill-child -- "$0" --inside "$@"
+  exec setpriv --pdeathsig KILL unshare --mount --pid --fork --kill-child -- "$0" --inside "$@"
 fi
 system=$2
 shift 2

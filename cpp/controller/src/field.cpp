@@ -56,7 +56,7 @@ void Field::only(std::initializer_list<const char*> allowed) const {
   }
   for (const auto& [key, member] : value_->items()) {
     const bool known =
-        std::any_of(allowed.begin(), allowed.end(), [&key = key](const char* name) { return key == name; });
+        std::any_of(allowed.begin(), allowed.end(), [&found = key](const char* name) { return found == name; });
     if (!known) {
       std::string names;
       for (const char* name : allowed) {

@@ -23,12 +23,12 @@ MonitorReport Monitor::observe(const StepInput& input, const StepReport& report)
   model_.inertia.clamp(premise.data());
   seen.membership_sum = model_.inertia.weight_sum(premise.data());
   if (bound_ && (report.flags & (kMeasurementInvalid | kReferenceInvalid)) == 0) {
-    seen.lyapunov = lyapunov(input, report);
+    seen.lyapunov = lyapunov(*bound_, input, report);
   }
   return seen;
 }
 
-double Monitor::lyapunov(const StepInput& input, const StepReport& report) const noexcept {
+double Monitor::lyapunov(const LyapunovBound& bound, const StepInput& input, const StepReport& report) const noexcept {
   const double T = sample_period_s_;
   Eigen::Matrix<double, LyapunovBound::kSignals, kMaxJoints> signals;
   for (int joint = 0; joint < kMaxJoints; ++joint) {
@@ -38,8 +38,8 @@ double Monitor::lyapunov(const StepInput& input, const StepReport& report) const
         T * (report.estimated_speed[j] - input.reference.speed[j]),
         T * T * (report.estimated_disturbance[j] - report.filtered_disturbance[j]), report.integral_error[j] / T;
   }
-  const Eigen::Matrix<double, kMaxJoints, kMaxJoints> energy = signals.transpose() * bound_->signals * signals;
-  return energy.cwiseProduct(bound_->joints).sum();
+  const Eigen::Matrix<double, kMaxJoints, kMaxJoints> energy = signals.transpose() * bound.signals * signals;
+  return energy.cwiseProduct(bound.joints).sum();
 }
 
 }  // namespace quasilpv

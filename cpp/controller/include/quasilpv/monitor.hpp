@@ -31,7 +31,7 @@ class Monitor {
   MonitorReport observe(const StepInput& input, const StepReport& report) const noexcept;
 
  private:
-  double lyapunov(const StepInput& input, const StepReport& report) const noexcept;
+  double lyapunov(const LyapunovBound& bound, const StepInput& input, const StepReport& report) const noexcept;
 
   DesignModel model_;
   std::optional<LyapunovBound> bound_;
