@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from quasilpv.artifact import write_artifact
 from quasilpv.cli import run
-from quasilpv.cli.usage import LARGEST_NUMBER, number
+from quasilpv.cli.usage import LARGEST_WRITTEN, number
 from quasilpv.cli.verbs import VERBS
 from quasilpv.release import release
 from quasilpv.synthesis import Specification
@@ -182,12 +182,12 @@ def test_when_an_argument_or_a_value_is_empty_expect_it_named(verb: str, capsys:
 
 
 @given(st.floats(allow_nan=True, allow_infinity=True), st.sampled_from(["{!r}", "{:.3e}", "{:f}", "+{!r}"]))
-@example(LARGEST_NUMBER, "{!r}")
+@example(LARGEST_WRITTEN, "{!r}")
 def test_a_number_is_read_as_it_is_written_or_not_at_all(value: float, form: str) -> None:
     text = form.format(value)
-    if abs(value) <= LARGEST_NUMBER and not text.startswith("+-"):
+    if abs(value) <= LARGEST_WRITTEN and not text.startswith("+-"):
         assert number(text) == float(text)
-    elif not abs(value) <= 1.001 * LARGEST_NUMBER:  # rounding of the text apart
+    elif not abs(value) <= 1.001 * LARGEST_WRITTEN:  # rounding of the text apart
         assert number(text) is None
 
 

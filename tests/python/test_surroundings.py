@@ -97,10 +97,10 @@ os.execv({sys.executable!r}, [{sys.executable!r}, "-m", "quasilpv", *sys.argv[1:
     assert done.stderr == "error: artifact.json: file: got No such file or directory, expected a readable file\n"
 
 
-@pytest.mark.parametrize("kilobytes", [128, 256])
-def test_when_the_stack_is_too_small_expect_a_line(kilobytes: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kibibytes", [128, 256])
+def test_when_the_stack_is_too_small_expect_a_line(kibibytes: int, tmp_path: Path) -> None:
     """Below about 100 kB the interpreter itself does not start."""
-    command = ["prlimit", f"--stack={kilobytes << 10}:{kilobytes << 10}", sys.executable, "-m", "quasilpv", "list"]
+    command = ["prlimit", f"--stack={kibibytes << 10}:{kibibytes << 10}", sys.executable, "-m", "quasilpv", "list"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == f"error: environment: stack: got {kilobytes} kB, expected at least 512 kB (ulimit -s)\n"
+    assert done.stderr == f"error: process: stack limit: got {kibibytes} KiB, expected at least 1024 KiB (ulimit -s)\n"

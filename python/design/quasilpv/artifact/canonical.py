@@ -24,7 +24,7 @@ from quasilpv.files import MAX_FILE_BYTES
 
 MAX_DEPTH = 32
 MAX_SAFE_INTEGER = 2**53 - 1
-LARGEST_NUMBER = 1e16
+LARGEST_WRITTEN = 1e16
 """Of numbers that people write: products of a few of them are finite, and as a count none of them fits into memory."""
 
 Document = dict[str, Any]
@@ -183,7 +183,7 @@ def parse_strict_json(data: bytes, source: str) -> Document:
 
 
 def require_bounded(tree: object, source: str, path: str = "") -> None:
-    """Refuse numbers beyond `LARGEST_NUMBER` anywhere in a document written by people.
+    """Refuse numbers beyond `LARGEST_WRITTEN` anywhere in a document written by people.
 
     Raises:
         InputError: the field and its value.
@@ -194,8 +194,8 @@ def require_bounded(tree: object, source: str, path: str = "") -> None:
     elif isinstance(tree, Sequence) and not isinstance(tree, str):
         for i, item in enumerate(tree):
             require_bounded(item, source, f"{path}[{i}]")
-    elif isinstance(tree, int | float) and abs(tree) > LARGEST_NUMBER:
-        raise InputError(source, path, f"{tree:g}", f"a number of at most {LARGEST_NUMBER:g} in magnitude")
+    elif isinstance(tree, int | float) and abs(tree) > LARGEST_WRITTEN:
+        raise InputError(source, path, f"{tree:g}", f"a number of at most {LARGEST_WRITTEN:g} in magnitude")
 
 
 def _parse_cbor(data: bytes, source: str) -> Document:

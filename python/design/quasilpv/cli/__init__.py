@@ -12,7 +12,8 @@ from collections.abc import Sequence
 
 __all__ = ["main", "run"]
 
-LEAST_STACK_BYTES = 512 << 10
+LEAST_STACK_KIB = 1024
+"""As for the executables. Below about 96 KiB the interpreter itself does not start, and nobody is left to say so."""
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -36,12 +37,17 @@ def main() -> None:
 
 def _require_stack() -> None:
     """Take as much stack as the caller allows; end with a line if that is too little."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_STACK)
-    if soft == resource.RLIM_INFINITY or soft >= LEAST_STACK_BYTES:
+    soft, hard = (limit >> 10 if limit != resource.RLIM_INFINITY else LEAST_STACK_KIB for limit in _stack_limits())
+    if soft >= LEAST_STACK_KIB:
         return
-    if hard == resource.RLIM_INFINITY or hard >= LEAST_STACK_BYTES:
-        resource.setrlimit(resource.RLIMIT_STACK, (LEAST_STACK_BYTES, hard))
+    if hard >= LEAST_STACK_KIB:
+        resource.setrlimit(resource.RLIMIT_STACK, (LEAST_STACK_KIB << 10, _stack_limits()[1]))
         return
-    expected = f"at least {LEAST_STACK_BYTES >> 10} kB (ulimit -s)"
-    sys.stderr.write(f"error: environment: stack: got {hard >> 10} kB, expected {expected}\n")
+    expected = f"at least {LEAST_STACK_KIB} KiB (ulimit -s)"
+    sys.stderr.write(f"error: process: stack limit: got {hard} KiB, expected {expected}\n")
     sys.exit(2)
+
+
+def _stack_limits() -> tuple[int, int]:
+    """Soft and hard limit, bytes."""
+    return resource.getrlimit(resource.RLIMIT_STACK)

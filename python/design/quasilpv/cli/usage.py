@@ -10,11 +10,11 @@ from typing import Any
 import typer
 from pydantic import ValidationError
 
-from quasilpv.artifact.canonical import LARGEST_NUMBER
+from quasilpv.artifact.canonical import LARGEST_WRITTEN
 from quasilpv.errors import InputError, one_of
 
 NUMBERS = {"float_parsing": "a number", "int_parsing": "a whole number", "int_from_float": "a whole number"}
-NUMBER_EXPECTED = f"a number between -{LARGEST_NUMBER:g} and {LARGEST_NUMBER:g}"
+NUMBER_EXPECTED = f"a number between -{LARGEST_WRITTEN:g} and {LARGEST_WRITTEN:g}"
 _DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 LIMITS = {"greater_than_equal": ("at least", "ge"), "less_than_equal": ("at most", "le")}
 
@@ -44,7 +44,7 @@ def require_values(arguments: Sequence[str]) -> None:
 
 
 def require_bounded(parameter: Any, value: object) -> None:
-    """Refuse numbers that are not finite or larger than `LARGEST_NUMBER`.
+    """Refuse numbers that are not finite or larger than `LARGEST_WRITTEN`.
 
     Args:
         parameter: an option or argument of a verb.
@@ -54,14 +54,14 @@ def require_bounded(parameter: Any, value: object) -> None:
         InputError: the option, and what is accepted.
     """
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if is_number and not abs(value) <= LARGEST_NUMBER:  # type: ignore[arg-type]  # NaN compares with nothing
+    if is_number and not abs(value) <= LARGEST_WRITTEN:  # type: ignore[arg-type]  # NaN compares with nothing
         raise InputError("command line", _name(parameter), f"{value:g}", NUMBER_EXPECTED)
 
 
 def number(text: str) -> float | None:
-    """A number as a person types it, finite and at most `LARGEST_NUMBER` in magnitude; None if it is none."""
+    """A number as a person types it, finite and at most `LARGEST_WRITTEN` in magnitude; None if it is none."""
     value = float(text) if _DECIMAL.fullmatch(text) else math.nan
-    return value if abs(value) <= LARGEST_NUMBER else None
+    return value if abs(value) <= LARGEST_WRITTEN else None
 
 
 def _parts(error: typer.TyperException, context: Any) -> tuple[str, str, str]:
