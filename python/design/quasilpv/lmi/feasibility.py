@@ -4,6 +4,8 @@ Inequalities ``F_k(x) > 0`` without constant terms hold at x if and only if they
 so nothing is lost by asking a solver for ``F_k(x) >= I``: a solution leaves room for an exact proof, and x = 0 is none.
 A candidate counts only after that proof. Infeasibility is numerical: the solver's dual certificate Z with ``Z_k >= 0``,
 ``sum_k <F_k(x), Z_k> = <r, x>`` shows that no x of norm below ``sum_k tr Z_k / |r|`` satisfies ``F_k(x) >= I``.
+That norm is no evidence: it is as large where a solver fails for its units alone as where there is no solution. Whether
+other units change the answer is for `quasilpv.studies.examination` to find out.
 """
 
 from __future__ import annotations
