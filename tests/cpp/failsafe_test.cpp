@@ -107,6 +107,24 @@ FailsafeFlags foreign(std::int64_t count) {
   return flags;
 }
 
+FailsafeFlags implausible(std::int64_t count) {
+  FailsafeFlags flags = invalid(count);
+  flags.measurement_implausible = true;
+  return flags;
+}
+
+FailsafeFlags speeds(std::int64_t count) {
+  FailsafeFlags flags;
+  flags.consecutive_speeds = count;
+  return flags;
+}
+
+FailsafeFlags refused(std::int64_t count) {
+  FailsafeFlags flags;
+  flags.start_refused = count > 0;
+  return flags;
+}
+
 // The sample that leaves the box is the first of the time outside, and one sample is one millisecond.
 FailsafeFlags outside_from_the_first_sample(std::int64_t /*count*/) {
   FailsafeFlags flags;
@@ -118,6 +136,9 @@ INSTANTIATE_TEST_SUITE_P(Failsafe, EveryLimit,
                          ::testing::Values(Limit{"measurements", invalid, 20, FaultCause::kMeasurementLost},
                                            Limit{"overruns", overruns, 21, FaultCause::kDeadlineOverrun},
                                            Limit{"foreign", foreign, 100, FaultCause::kForeignMessages},
+                                           Limit{"implausible", implausible, 20, FaultCause::kMeasurementImplausible},
+                                           Limit{"speeds", speeds, 20, FaultCause::kSpeedBeyondDomain},
+                                           Limit{"start", refused, 1, FaultCause::kStartRefused},
                                            Limit{"premise", outside_from_the_first_sample, 1001,
                                                  FaultCause::kPremiseOutsideBox}),
                          [](const auto& limit) { return std::string(limit.param.name); });
@@ -171,7 +192,8 @@ TEST(Failsafe, when_reset_while_a_cause_or_an_invalid_measurement_is_there_expec
   stop.stop_requested = true;
   FailsafeFlags silent;
   silent.plant_silent = true;
-  for (const FailsafeFlags& flags : {invalid(1), invalid(20), overruns(21), foreign(100), stop, silent}) {
+  for (const FailsafeFlags& flags :
+       {invalid(1), invalid(20), implausible(1), speeds(20), overruns(21), foreign(100), stop, silent}) {
     EXPECT_EQ(after_reset({}, fault_of(invalid(20)), flags).state, ControllerState::kFault);
   }
 }

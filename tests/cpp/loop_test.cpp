@@ -169,8 +169,8 @@ TEST_F(LatchedFault, is_not_left_while_angles_are_missing) {
   EXPECT_EQ(loop_.state(), ControllerState::kFault);
 }
 
-TEST_F(LatchedFault, is_left_by_a_reset_from_the_torque_in_force_without_a_bump) {
-  constexpr double kStatedStep = 2.0 * 1500.0 * 1e-3 / 0.1;  // N m: limits, sample period, ramp
+// The arm was moved while nobody controlled it; the start after the reset is that of start_test.cpp.
+TEST_F(LatchedFault, is_left_by_a_reset_wherever_the_arm_is_in_its_domain) {
   const JointArray away{kStart[0] + 0.4, kStart[1], kStart[2]};
   for (std::int64_t seq = 80; seq < 150; ++seq) {
     loop_.handle(reading(seq, away), at(seq));
@@ -178,18 +178,20 @@ TEST_F(LatchedFault, is_left_by_a_reset_from_the_torque_in_force_without_a_bump)
   EXPECT_EQ(torque_of(loop_), JointArray{});
   ASSERT_TRUE(loop_.reset_fault());
   EXPECT_EQ(loop_.state(), ControllerState::kReady);
-  JointArray previous{};
   for (std::int64_t seq = 150; seq < 250; ++seq) {
     loop_.handle(reading(seq, away), at(seq));
     ASSERT_EQ(loop_.state(), ControllerState::kRunning);
-    for (std::size_t j = 0; j < kJoints; ++j) {
-      ASSERT_LE(std::abs(torque_of(loop_)[j] - previous[j]), kStatedStep * (1 + 1e-12));
-    }
-    previous = torque_of(loop_);
   }
-  EXPECT_NE(previous, JointArray{});
+  EXPECT_NE(torque_of(loop_), JointArray{});
   EXPECT_EQ(loop_.faults(), 1);
   EXPECT_FALSE(loop_.reset_fault()) << "there is no fault to leave";
+}
+
+TEST_F(LatchedFault, is_not_left_outside_the_domain) {
+  for (std::int64_t seq = 80; seq < 150; ++seq) {
+    loop_.handle(reading(seq, {kStart[0] + 6.283185307179586, kStart[1], kStart[2]}), at(seq));
+  }
+  EXPECT_FALSE(loop_.reset_fault());
 }
 
 TEST(ControlLoop, when_samples_are_missing_expect_a_telemetry_sample_for_each_prediction) {

@@ -111,7 +111,10 @@ TEST(Monitor, changes_no_command) {
 }
 
 TEST(Monitor, is_in_the_telemetry_of_every_sample_and_falls_back_to_the_prediction) {
-  ControlLoop loop(artifact(), trajectory(), {});
+  Json table = artifact_table("dob-acceleration", kJoints);
+  table["law"]["lyapunov_bound"] = TestArm{kJoints}.lyapunov_bound();
+  table["domain"]["angle_rad"][1] = {-3.0, 3.0};  // wider than the box of its premise
+  ControlLoop loop(Artifact::parse(json_twin(table), "test"), trajectory(), {});
   auto ring = std::make_unique<SampleRing>();
   loop.publish_to(ring.get());
   const JointArray outside{0.1, std::acos(-0.8), 0.2};

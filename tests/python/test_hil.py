@@ -8,6 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from quasilpv.scenarios import read_scenario
 from two_processes import LIMIT_S, SAMPLES, Experiment, WirePlant, executable, finish, without_privileges
 
 pytest_plugins = ["two_processes"]
@@ -96,7 +97,8 @@ def test_when_a_plant_written_in_python_follows_the_documented_format_expect_it_
     experiment: Experiment, message_types: ModuleType
 ) -> None:
     controller = experiment.start(experiment.controller_command("--timeout-s", "20"))
-    command = WirePlant(experiment, message_types).exchange(0, [0.0, 0.0, 0.0])
+    start = read_scenario(experiment.folder / "scenario.json").initial.angle_rad
+    command = WirePlant(experiment, message_types).exchange(0, start)
     assert (command.seq, command.session, command.joints) == (0, experiment.session, 3)
     controller.terminate()
     assert finish(controller)[0] == 0

@@ -26,7 +26,7 @@ import pytest
 
 from quasilpv.artifact import read_artifact, write_artifact
 from quasilpv.release import release
-from quasilpv.scenarios import build_scenario, read_scenario, write_scenario
+from quasilpv.scenarios import EXTERNAL_TORQUE, build_scenario, read_scenario, write_scenario
 from quasilpv.synthesis import Specification
 from quasilpv.systems.registry import robot
 from quasilpv.trajectories import serial_square
@@ -107,12 +107,12 @@ def finish(process: subprocess.Popen[str]) -> tuple[int, dict[str, Any], str]:
     return process.returncode, json.loads(output) if output else {}, errors
 
 
-def wait_for_commands(experiment: Experiment, count: int = 20) -> None:
+def wait_for_commands(experiment: Experiment, count: int = 20, limit_s: float = LIMIT_S) -> None:
     """Until some commands were on the wire."""
     listener = lcm.LCM(experiment.url)
     heard: list[bytes] = []
     listener.subscribe("QLPV_COMMAND", lambda _, data: heard.append(data))
-    deadline = time.monotonic() + LIMIT_S
+    deadline = time.monotonic() + limit_s
     while len(heard) < count and time.monotonic() < deadline:
         listener.handle_timeout(100)
     assert len(heard) >= count
@@ -145,23 +145,24 @@ class WirePlant:
         assert command.crc == zlib.crc32(data[:-8])
         self._commands.append(command)
 
-    def send(self, seq: int, angles: Sequence[float], *, session_offset: int = 0) -> None:
+    def send(self, seq: int, angles: Sequence[float], speeds: Sequence[float] = (), *, session_offset: int = 0) -> None:
         message = self._types.measurement_v2()
         message.seq, message.session, message.artifact_hash = seq, self._session + session_offset, self._hash
         message.joints = self._joints
         message.sender, message.period_ns = self._sender, self._period_ns
         message.angle_rad = [*angles, *[0.0] * (7 - len(angles))]
+        message.speed_rad_s = [*speeds, *[0.0] * (7 - len(speeds))]
         message.crc = zlib.crc32(message.encode()[:-8])
         self._wire.publish("QLPV_MEASUREMENT", message.encode())
 
     def listen(self, milliseconds: int = 1) -> None:
         self._wire.handle_timeout(milliseconds)
 
-    def exchange(self, seq: int, angles: Sequence[float]) -> Any:
+    def exchange(self, seq: int, angles: Sequence[float], speeds: Sequence[float] = ()) -> Any:
         """The command for this measurement, which is repeated until it is answered."""
         deadline = time.monotonic() + LIMIT_S
         while time.monotonic() < deadline:
-            self.send(seq, angles)
+            self.send(seq, angles, speeds)
             self.listen(50)
             answers = [command for command in self._commands if command.seq == seq]
             if answers:
@@ -176,7 +177,7 @@ def documents(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("hil")
     arm = robot("arm3")
     trajectory = serial_square(arm.model)
-    scenario = build_scenario(arm, trajectory, transport_delay_s=2e-4)
+    scenario = build_scenario(arm, trajectory, external_torque=EXTERNAL_TORQUE, transport_delay_s=2e-4)
     write_artifact(folder, release("arm3", "ctc-dob", Specification()).artifact)
     write_trajectory(folder / "trajectory.json", trajectory)
     write_scenario(folder / "scenario.json", scenario.model_copy(update={"duration_s": SAMPLES * 1e-3}))

@@ -44,9 +44,6 @@ void declare_all(CLI::App& app, Options& options) {
   app.add_option("--silence-s", options.run.silence_s, "realtime: fault after so long without a measurement")
       ->check(CLI::PositiveNumber.description(""))
       ->capture_default_str();
-  app.add_option("--start-ramp-s", options.loop.ramp_s, "realtime: way from the hold torque to the full range")
-      ->check(CLI::PositiveNumber.description(""))
-      ->capture_default_str();
   app.add_flag("--exit-on-fault", options.run.exit_on_fault, "end the run once a fault has led to the safe torque");
 }
 
@@ -81,6 +78,9 @@ Json describe(const ControlLoop& loop, const ControllerRunReport& run, const Tel
 
 /// Why the run counts as stopped by a fault; empty if it does not.
 std::string fault_stop_reason(const ControlLoop& loop, const ControllerRunReport& run, const Link& link) {
+  if (loop.refusal()) {
+    return to_string(*loop.refusal());
+  }
   if (loop.state() == ControllerState::kFault && loop.cause() != FaultCause::kStopRequested) {
     return naming(to_string(loop.cause()), link);
   }

@@ -38,6 +38,8 @@ class ComputedTorqueLaw final : public VelocityLaw<N> {
 
   void start(const JointVector<N>& speed) noexcept override { observer_state_ = -observer_gain_ * speed; }
 
+  bool feeds_forward() const noexcept override { return true; }
+
   Command<N> control(const Sample& sample, const ModelSample<N>& model, StepReport& report) noexcept override {
     const auto& [reference, y, w, integral] = sample;
     coriolis_.evaluate({y.data(), w.data(), nullptr}, bias_.data());

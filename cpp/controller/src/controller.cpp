@@ -20,7 +20,9 @@ StepReport Controller::step(const StepInput& input) noexcept { return law_->step
 
 void Controller::reset() noexcept { law_->reset(); }
 
-void Controller::take_over(const JointArray& in_force, double ramp_s) noexcept { law_->take_over(in_force, ramp_s); }
+void Controller::take_over(const JointArray& in_force, const JointArray& speed) noexcept {
+  law_->take_over(in_force, speed);
+}
 
 int Controller::joints() const noexcept { return joints_; }
 

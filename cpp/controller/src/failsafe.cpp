@@ -15,8 +15,14 @@ FaultCause fault_cause(const FailsafeSettings& settings, const FailsafeFlags& fl
   if (flags.plant_silent) {
     return FaultCause::kPlantSilent;
   }
+  if (flags.start_refused) {
+    return FaultCause::kStartRefused;
+  }
   if (flags.consecutive_invalid >= settings.invalid_limit) {
-    return FaultCause::kMeasurementLost;
+    return flags.measurement_implausible ? FaultCause::kMeasurementImplausible : FaultCause::kMeasurementLost;
+  }
+  if (flags.consecutive_speeds >= settings.speed_limit) {
+    return FaultCause::kSpeedBeyondDomain;
   }
   if (flags.consecutive_overruns > settings.overrun_limit) {
     return FaultCause::kDeadlineOverrun;
@@ -70,6 +76,12 @@ const char* to_string(FaultCause cause) noexcept {
       return "second controller on this session";
     case FaultCause::kPlantFailed:
       return "plant failed";
+    case FaultCause::kMeasurementImplausible:
+      return "measurement implausible";
+    case FaultCause::kSpeedBeyondDomain:
+      return "speed beyond the domain";
+    case FaultCause::kStartRefused:
+      return "start refused";
   }
   return "unknown";
 }
@@ -91,8 +103,9 @@ FailsafeState next_state(const FailsafeSettings& settings, const FailsafeState& 
     next.fault_since_ns = now_ns;
     return next;
   }
-  const bool degraded = flags.consecutive_invalid > 0 || flags.consecutive_overruns > 0 ||
-                        flags.consecutive_foreign > 0 || flags.law_invalid || outside_ns > settings.premise_degraded_ns;
+  const bool degraded = flags.consecutive_invalid > 0 || flags.consecutive_speeds > 0 ||
+                        flags.consecutive_overruns > 0 || flags.consecutive_foreign > 0 || flags.law_invalid ||
+                        outside_ns > settings.premise_degraded_ns;
   next.state = degraded ? ControllerState::kDegraded : ControllerState::kRunning;
   return next;
 }

@@ -23,6 +23,8 @@ class HinfTrackingLaw final : public VelocityLaw<N> {
  private:
   using typename VelocityLaw<N>::Sample;
 
+  bool feeds_forward() const noexcept override { return false; }
+
   Command<N> control(const Sample& sample, const ModelSample<N>& model, StepReport& report) noexcept override {
     TrackingGain<N> numerator;
     numerator_.evaluate(report.premise.data(), numerator);

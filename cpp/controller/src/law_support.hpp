@@ -86,7 +86,8 @@ class ReferenceGuard {
 };
 
 /// Angle and speed as the baselines use them: the speed low-pass filtered, w = a w + (1 - a) w_measured with
-/// a = exp(-T/T_f), starting at the first measured speed; both held while there is no valid measurement.
+/// a = exp(-T/T_f), starting at the first measured speed, or before it at the one of begin_at(); both held while there
+/// is no valid measurement.
 template <int N>
 class MeasurementFilter {
  public:
@@ -103,12 +104,19 @@ class MeasurementFilter {
       return false;
     }
     angle_ = measured_angle;
-    speed_ = started_ ? JointVector<N>(pole_ * speed_ + (1.0 - pole_) * measured_speed) : measured_speed;
+    const bool continues = started_ || begun_;
+    speed_ = continues ? JointVector<N>(pole_ * speed_ + (1.0 - pole_) * measured_speed) : measured_speed;
     started_ = true;
     return true;
   }
 
-  void reset() noexcept { started_ = false; }
+  void reset() noexcept { started_ = begun_ = false; }
+
+  /// The filter stood at this speed before the first measurement.
+  void begin_at(const JointVector<N>& speed) noexcept {
+    speed_ = speed;
+    begun_ = true;
+  }
 
   bool started() const noexcept { return started_; }
   const JointVector<N>& angle() const noexcept { return angle_; }
@@ -117,6 +125,7 @@ class MeasurementFilter {
  private:
   double pole_;
   bool started_ = false;
+  bool begun_ = false;
   JointVector<N> angle_ = JointVector<N>::Zero();
   JointVector<N> speed_ = JointVector<N>::Zero();
 };

@@ -6,7 +6,7 @@
 namespace quasilpv {
 
 Limiter::Limiter(const TorqueLimits& limits, double sample_period_s, int joints)
-    : limits_(limits), sample_period_s_(sample_period_s), joints_(static_cast<std::size_t>(joints)) {
+    : limits_(limits), joints_(static_cast<std::size_t>(joints)) {
   for (std::size_t j = 0; j < joints_; ++j) {
     max_change_[j] = limits.slew_nm_per_s[j] * sample_period_s;
   }
@@ -18,11 +18,10 @@ std::uint32_t Limiter::apply(const JointArray& commanded, JointArray& applied) n
     return kTorqueNotFinite;
   }
   std::uint32_t flags = kStepHealthy;
-  const JointArray& change = ramp_samples_left_ > 0 ? ramp_change_ : max_change_;
   JointArray limited{};
   for (std::size_t j = 0; j < joints_; ++j) {
     const double saturated = std::clamp(commanded[j], -limits_.torque_nm[j], limits_.torque_nm[j]);
-    limited[j] = started_ ? std::clamp(saturated, last_[j] - change[j], last_[j] + change[j]) : saturated;
+    limited[j] = started_ ? std::clamp(saturated, last_[j] - max_change_[j], last_[j] + max_change_[j]) : saturated;
     flags |= saturated != commanded[j] ? kTorqueSaturated : kStepHealthy;
     flags |= limited[j] != saturated ? kSlewLimited : kStepHealthy;
   }
@@ -32,7 +31,6 @@ std::uint32_t Limiter::apply(const JointArray& commanded, JointArray& applied) n
   applied = limited;
   last_ = limited;
   started_ = true;
-  ramp_samples_left_ = std::max<std::int64_t>(ramp_samples_left_ - 1, 0);
   return flags;
 }
 
@@ -47,17 +45,13 @@ std::uint32_t Limiter::apply(const JointArray& torque, bool commanded, JointArra
 void Limiter::reset() noexcept {
   last_ = {};
   started_ = false;
-  ramp_samples_left_ = 0;
 }
 
-void Limiter::take_over(const JointArray& in_force, double ramp_s) noexcept {
+void Limiter::take_over(const JointArray& in_force) noexcept {
   reset();
   started_ = true;
-  ramp_samples_left_ = std::llround(ramp_s / sample_period_s_);
-  const double share = ramp_s > 0.0 ? 2.0 * sample_period_s_ / ramp_s : 1.0;
   for (std::size_t j = 0; j < joints_; ++j) {
     last_[j] = std::clamp(in_force[j], -limits_.torque_nm[j], limits_.torque_nm[j]);
-    ramp_change_[j] = std::min(max_change_[j], share * limits_.torque_nm[j]);
   }
 }
 

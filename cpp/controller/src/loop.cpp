@@ -18,6 +18,14 @@ void copy(const JointArray& source, double (&target)[kMaxJoints]) noexcept {
   std::copy(source.begin(), source.end(), target);
 }
 
+void add(const Reference& offset, Reference& reference) noexcept {
+  for (std::size_t j = 0; j < kMaxJoints; ++j) {
+    reference.angle[j] += offset.angle[j];
+    reference.speed[j] += offset.speed[j];
+    reference.acceleration[j] += offset.acceleration[j];
+  }
+}
+
 }  // namespace
 
 ControlLoop::ControlLoop(const Artifact& artifact, const Trajectory& trajectory, const LoopSettings& settings)
@@ -25,7 +33,10 @@ ControlLoop::ControlLoop(const Artifact& artifact, const Trajectory& trajectory,
       trajectory_(trajectory),
       settings_(settings),
       safe_torque_(artifact, settings.safe_action),
-      monitor_(artifact) {
+      monitor_(artifact),
+      plausibility_(artifact),
+      joining_(artifact),
+      bumpless_(settings.bumpless_start) {
   if (trajectory.joints() != artifact.joints()) {
     throw InputError("trajectory '" + trajectory.name() + "'", "joints", std::to_string(trajectory.joints()),
                      std::to_string(artifact.joints()) + " as in artifact '" + artifact.name() + "'");
@@ -35,27 +46,93 @@ ControlLoop::ControlLoop(const Artifact& artifact, const Trajectory& trajectory,
 }
 
 void ControlLoop::handle(const RobotReading& reading, const SampleConditions& conditions) noexcept {
+  if (refusal_) {
+    return;
+  }
   if (started()) {
     predict_missing(reading.seq, conditions);
-  }
-  if (!begun_) {
-    begin_without_a_bump(reading.angle_rad);
   }
   StepInput input;
   input.seq = reading.seq;
   input.angle = reading.angle_rad;
   input.speed = reading.speed_rad_s;
+  input.valid = accept(reading);
+  if (refusal_) {
+    refuse_start(reading.seq, conditions.now_ns);
+    return;
+  }
   step(input, conditions, false);
 }
 
-void ControlLoop::begin_without_a_bump(const JointArray& angle) noexcept {
-  begun_ = std::all_of(angle.begin(), angle.begin() + joints(), [](double value) { return std::isfinite(value); });
-  if (begun_ && settings_.bumpless_start) {
-    controller_.take_over(safe_torque_.hold(angle), settings_.ramp_s);
+bool ControlLoop::accept(const RobotReading& reading) noexcept {
+  const JointArray& angle = reading.angle_rad;
+  implausible_ = false;
+  if (!std::all_of(angle.begin(), angle.begin() + joints(), [](double value) { return std::isfinite(value); })) {
+    return false;
+  }
+  const bool follows = plausibility_.can_follow(reading.seq, angle);
+  std::optional<StartRefusal> refusal;
+  if (start_ == Start::kAwaited || state() == ControllerState::kFault) {  // what follows is a start
+    refusal = plausibility_.refuse_start(angle, path(reading.seq).angle);
+  }
+  if (refusal && !plausibility_.has_accepted()) {
+    refusal_ = refusal;
+  }
+  const bool accepted = follows && !refusal && plausibility_.can_be_speed(reading.speed_rad_s);
+  // After a fault the arm moves while nobody controls it: the next reading is compared with this one, whatever it is.
+  if (accepted || state() == ControllerState::kFault) {
+    plausibility_.accept(reading.seq, angle);
+  } else {
+    plausibility_.refuse();
+  }
+  implausible_ = !accepted;
+  return accepted;
+}
+
+void ControlLoop::refuse_start(std::int64_t seq, std::int64_t now_ns) noexcept {
+  observed_ = {};
+  observed_.start_refused = true;
+  failsafe_ = next_state(settings_.failsafe, failsafe_, observed_, now_ns);
+  ++faults_;
+  last_seq_ = seq;
+}
+
+void ControlLoop::advance_start(StepInput& input) noexcept {
+  if (input.valid && start_ == Start::kHeld) {
+    join(input);
+  } else if (input.valid && start_ == Start::kAwaited) {
+    start_ = bumpless_ ? Start::kHeld : Start::kOver;
+    held_seq_ = input.seq;
+    held_angle_ = input.angle;
+  }
+  if (start_ == Start::kHeld) {
+    input.reference.angle = held_angle_;
+    input.reference.speed = {};
+    input.speed = {};
+  } else if (joining_.is_joining(input.seq)) {
+    input.joining = true;
+    input.offset = joining_.offset(input.seq);
+    add(input.offset, input.reference);
   }
 }
 
+void ControlLoop::join(const StepInput& input) noexcept {
+  const double elapsed_s = static_cast<double>(input.seq - held_seq_) * sample_period_s();
+  JointArray speed{};
+  JointArray offset{};
+  JointArray offset_speed{};
+  for (std::size_t j = 0; j < static_cast<std::size_t>(joints()); ++j) {
+    speed[j] = (input.angle[j] - held_angle_[j]) / elapsed_s;
+    offset[j] = input.angle[j] - input.reference.angle[j];
+    offset_speed[j] = speed[j] - input.reference.speed[j];
+  }
+  controller_.take_over(last_torque_, speed);
+  joining_.begin(input.seq, offset, offset_speed);
+  start_ = Start::kOver;
+}
+
 void ControlLoop::handle_silence(const SampleConditions& conditions) noexcept {
+  implausible_ = false;
   StepInput input;
   input.seq = last_seq_ + 1;
   input.valid = false;
@@ -67,6 +144,7 @@ void ControlLoop::predict_missing(std::int64_t next_seq, const SampleConditions&
   const std::int64_t missing = next_seq - last_seq_ - 1;
   const std::int64_t predicted = std::min(missing, settings_.failsafe.invalid_limit);
   const std::int64_t first = last_seq_ + 1;
+  implausible_ = false;
   for (std::int64_t i = 0; i < predicted; ++i) {
     StepInput input;
     input.seq = first + i;
@@ -79,20 +157,15 @@ void ControlLoop::predict_missing(std::int64_t next_seq, const SampleConditions&
 void ControlLoop::step(const StepInput& sample, const SampleConditions& conditions, bool plant_silent) noexcept {
   StepInput input = sample;
   const std::int64_t start_ns = monotonic_ns();
-  input.reference = trajectory_.evaluate(static_cast<double>(input.seq) * sample_period_s());
-  const StepReport report = controller_.step(input);
+  input.reference = path(input.seq);
+  advance_start(input);
+  StepReport report = controller_.step(input);
   const std::int64_t step_ns = monotonic_ns() - start_ns;
 
   step_time_.add(step_ns);
+  note_measurement(input, report);
   flags_ |= report.flags;
   last_seq_ = input.seq;
-  if ((report.flags & kMeasurementInvalid) != 0) {
-    ++consecutive_invalid_;
-    predicted_steps_ += 1;
-  } else {
-    consecutive_invalid_ = 0;
-    last_valid_angle_ = input.angle;
-  }
   const std::int64_t faults_before = faults_;
   judge(report, conditions, plant_silent);
   write_command(report, input, conditions.now_ns);
@@ -100,6 +173,23 @@ void ControlLoop::step(const StepInput& sample, const SampleConditions& conditio
   if (faults_ > faults_before) {
     post_mortem_.keep();
   }
+}
+
+void ControlLoop::note_measurement(const StepInput& input, StepReport& report) noexcept {
+  report.flags |= implausible_ ? kMeasurementImplausible : kStepHealthy;
+  if ((report.flags & kMeasurementInvalid) != 0) {
+    ++consecutive_invalid_;
+    ++predicted_steps_;
+    last_valid_speed_ = {};  // nothing is known of it now
+    return;
+  }
+  consecutive_invalid_ = 0;
+  last_valid_angle_ = input.angle;
+  last_valid_speed_ = input.speed;
+  plausibility_.estimate(report.estimated_speed);
+  const bool too_fast = plausibility_.is_beyond_domain(report.estimated_speed);
+  report.flags |= too_fast ? kSpeedBeyondDomain : kStepHealthy;
+  consecutive_speeds_ = too_fast ? consecutive_speeds_ + 1 : 0;
 }
 
 void ControlLoop::judge(const StepReport& report, const SampleConditions& conditions, bool plant_silent) noexcept {
@@ -112,6 +202,8 @@ void ControlLoop::judge(const StepReport& report, const SampleConditions& condit
   observed.plant_silent = plant_silent;
   observed.stop_requested = conditions.stop_requested;
   observed.demanded = conditions.demanded;
+  observed.measurement_implausible = implausible_;
+  observed.consecutive_speeds = consecutive_speeds_;
   observed_ = observed;
   const bool was_fault = failsafe_.state == ControllerState::kFault;
   failsafe_ = next_state(settings_.failsafe, failsafe_, observed, conditions.now_ns);
@@ -127,7 +219,10 @@ bool ControlLoop::reset_fault() noexcept {
     return false;
   }
   failsafe_ = next;
-  controller_.take_over(last_torque_, settings_.ramp_s);
+  controller_.take_over(last_torque_, {});
+  joining_.end();
+  start_ = Start::kAwaited;
+  bumpless_ = true;
   return true;
 }
 
@@ -139,7 +234,7 @@ bool ControlLoop::is_safe(std::int64_t now_ns) const noexcept {
 void ControlLoop::write_command(const StepReport& report, const StepInput& input, std::int64_t now_ns) noexcept {
   const FailsafeAction action = action_of(settings_.failsafe, failsafe_, now_ns);
   last_torque_ = action.use_safe_torque ? safe_torque_.apply(action.safe_share, torque_at_fault_, last_torque_,
-                                                             last_valid_angle_, input.speed)
+                                                             last_valid_angle_, last_valid_speed_)
                                         : report.torque_applied;
   command_.seq = input.seq;
   command_.state = failsafe_.state;
@@ -152,9 +247,10 @@ void ControlLoop::write_telemetry(const StepInput& input, const StepReport& repo
   telemetry_.state = static_cast<std::int32_t>(failsafe_.state);
   telemetry_.flags = static_cast<std::int32_t>(report.flags);
   telemetry_.step_ns = step_ns;
-  copy(input.reference.angle, telemetry_.reference_angle_rad);
-  copy(input.reference.speed, telemetry_.reference_speed_rad_s);
-  copy(input.reference.acceleration, telemetry_.reference_acceleration_rad_s2);
+  const Reference on_path = path(input.seq);
+  copy(on_path.angle, telemetry_.reference_angle_rad);
+  copy(on_path.speed, telemetry_.reference_speed_rad_s);
+  copy(on_path.acceleration, telemetry_.reference_acceleration_rad_s2);
   copy(input.angle, telemetry_.measured_angle_rad);
   copy(input.speed, telemetry_.measured_speed_rad_s);
   copy(report.estimated_angle, telemetry_.estimated_angle_rad);

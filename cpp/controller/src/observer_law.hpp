@@ -8,8 +8,9 @@
 namespace quasilpv {
 
 /// One sample of a law that reads angles only and observes x_hat = [th, w, disturbance, its rate]. Starts at
-/// x_hat = (y, 0, 0, 0), d_f = e_I = 0. Without a valid measurement the innovation is zero, the prediction stands in
-/// for y, and e_I is frozen. A state that overflowed is dropped: the law starts again at the next valid measurement.
+/// x_hat = (y, w_0, 0, 0), d_f = e_I = 0, with w_0 = 0 unless take_over() knows better. Without a valid measurement the
+/// innovation is zero, the prediction stands in for y, and e_I is frozen. A state that overflowed is dropped: the law
+/// starts again at the next valid measurement.
 template <int N>
 class ObserverLaw : public ControlLaw {
  public:
@@ -48,12 +49,14 @@ class ObserverLaw : public ControlLaw {
 
   void reset() noexcept final {
     started_ = false;
+    first_speed_.setZero();
     limiter_.reset();
   }
 
-  void take_over(const JointArray& in_force, double ramp_s) noexcept final {
+  void take_over(const JointArray& in_force, const JointArray& speed) noexcept final {
     reset();
-    limiter_.take_over(in_force, ramp_s);
+    first_speed_ = from_array<N>(speed);
+    limiter_.take_over(in_force);
   }
 
  protected:
@@ -71,7 +74,8 @@ class ObserverLaw : public ControlLaw {
 
  private:
   void start(const JointVector<N>& measured) noexcept {
-    state_ = ObserverState<N>::at_rest(measured);
+    state_ = ObserverState<N>::undisturbed(measured, first_speed_);
+    first_speed_.setZero();  // of this start only
     reference_.reset(measured);
     started_ = true;
   }
@@ -92,6 +96,7 @@ class ObserverLaw : public ControlLaw {
   Limiter limiter_;
   ReferenceGuard<N> reference_;
   ObserverState<N> state_;
+  JointVector<N> first_speed_ = JointVector<N>::Zero();
   bool started_ = false;
 };
 

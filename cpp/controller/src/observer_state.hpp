@@ -15,9 +15,9 @@ struct ObserverState {
   JointVector<N> filtered_disturbance;
   JointVector<N> integral_error;
 
-  static ObserverState at_rest(const JointVector<N>& angle) noexcept {
+  static ObserverState undisturbed(const JointVector<N>& angle, const JointVector<N>& speed) noexcept {
     const JointVector<N> zero = JointVector<N>::Zero();
-    return {angle, zero, zero, zero, zero, zero};
+    return {angle, speed, zero, zero, zero, zero};
   }
 
   /// d_f = q d_f + (1 - q) d

@@ -24,6 +24,8 @@ class PidLaw final : public VelocityLaw<N> {
  private:
   using typename VelocityLaw<N>::Sample;
 
+  bool feeds_forward() const noexcept override { return true; }
+
   Command<N> control(const Sample& sample, const ModelSample<N>& model, StepReport& /*report*/) noexcept override {
     const auto& [reference, y, w, integral] = sample;
     JointVector<N> coriolis;

@@ -80,6 +80,9 @@ class ControllerRun {
     if (loop_.is_new(reading.seq)) {
       report_.arrival.add(now_ns_ - reading.taken_ns);
       loop_.handle(reading, conditions(reading.seq));
+      if (loop_.refusal()) {
+        return;
+      }
       send_command();
       count_overrun();
     } else if (!is_real_time() && reading.seq == loop_.last_seq()) {
@@ -125,6 +128,9 @@ class ControllerRun {
   }
 
   std::optional<ControllerRunEnd> find_end() noexcept {
+    if (loop_.refusal()) {
+      return ControllerRunEnd::kStartRefused;
+    }
     const RobotRequest request = robot_.take_request();
     if (request == RobotRequest::kEnd) {
       return ControllerRunEnd::kPlantEnded;
@@ -179,6 +185,8 @@ const char* to_string(ControllerRunEnd end) noexcept {
       return "fault";
     case ControllerRunEnd::kRefused:
       return "refused";
+    case ControllerRunEnd::kStartRefused:
+      return "start refused";
     case ControllerRunEnd::kPlantSilent:
       return "plant silent";
     case ControllerRunEnd::kPlantNeverHeard:

@@ -22,20 +22,10 @@ SafeTorque::SafeTorque(const Artifact& artifact, SafeAction action)
       torque_limit_(artifact.limits().torque_nm),
       joints_(static_cast<std::size_t>(artifact.joints())) {
   for (std::size_t j = 0; j < joints_; ++j) {
-    const Interval& speed = artifact.domain().speed_rad_s[j];
-    const double fastest = std::max(std::abs(speed.low), std::abs(speed.high));
+    const double fastest = artifact.domain().fastest(j);
     damping_[j] = fastest > 0.0 ? kDampingShare * torque_limit_[j] / fastest : 0.0;
     max_change_[j] = artifact.limits().slew_nm_per_s[j] * artifact.sample_period_s();
   }
-}
-
-JointArray SafeTorque::hold(const JointArray& angle) const noexcept {
-  JointArray torque{};
-  gravity_.evaluate({angle.data(), nullptr, nullptr}, torque.data());
-  for (std::size_t j = 0; j < joints_; ++j) {
-    torque[j] = std::clamp(finite_or_zero(torque[j]), -torque_limit_[j], torque_limit_[j]);
-  }
-  return torque;
 }
 
 JointArray SafeTorque::apply(double share, const JointArray& from, const JointArray& last, const JointArray& angle,

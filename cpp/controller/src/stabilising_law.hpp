@@ -32,6 +32,8 @@ class StabilisingLaw : public VelocityLaw<N> {
   virtual JointVector<N> feedback(const StateError<N>& state, PremiseArray& premise, const ModelSample<N>& model,
                                   StepReport& report) noexcept = 0;
 
+  bool feeds_forward() const noexcept final { return false; }
+
   Command<N> control(const Sample& sample, const ModelSample<N>& model, StepReport& report) noexcept final {
     PremiseArray premise{};
     schedule_.evaluate({sample.angle.data(), sample.speed.data(), nullptr}, premise.data());

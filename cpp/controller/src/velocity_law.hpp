@@ -30,7 +30,10 @@ class VelocityLaw : public ControlLaw {
     to_array<N>(sample.speed, report.estimated_speed);
     to_array<N>(sample.integral, report.integral_error);
     const ModelSample<N> model = sample_model<N>(model_, sample.angle, report);
-    const Command<N> command = control(sample, model, report);
+    Command<N> command = control(sample, model, report);
+    if (input.joining && !feeds_forward()) {
+      command.torque += torque_of(input.offset, sample.angle, model);
+    }
     to_array<N>(command.torque, report.torque_commanded);
     report.flags |= limiter_.apply(report.torque_commanded, input.commanded, report.torque_applied);
     if (valid) {
@@ -45,9 +48,10 @@ class VelocityLaw : public ControlLaw {
     limiter_.reset();
   }
 
-  void take_over(const JointArray& in_force, double ramp_s) noexcept final {
+  void take_over(const JointArray& in_force, const JointArray& speed) noexcept final {
     reset();
-    limiter_.take_over(in_force, ramp_s);
+    measurement_.begin_at(from_array<N>(speed));
+    limiter_.take_over(in_force);
   }
 
  protected:
@@ -68,10 +72,21 @@ class VelocityLaw : public ControlLaw {
  private:
   /// The law starts with this speed.
   virtual void start(const JointVector<N>& /*speed*/) noexcept {}
+  /// Whether control() feeds the acceleration of the reference and gravity forward.
+  virtual bool feeds_forward() const noexcept = 0;
   /// The torque of this sample, before limits.
   virtual Command<N> control(const Sample& sample, const ModelSample<N>& model, StepReport& report) noexcept = 0;
   /// The torque that acts is in the report.
   virtual void applied(const Sample& /*sample*/, const ModelSample<N>& /*model*/, StepReport& /*report*/) noexcept {}
+
+  /// What a reference that is off its path by `offset` asks for beside the law of a reference on it:
+  /// M(y) offset'' + G(y) - G(y - offset). So a law that lives from feedback alone is no worse off while a start joins.
+  JointVector<N> torque_of(const Reference& offset, const JointVector<N>& y, const ModelSample<N>& model) noexcept {
+    const JointVector<N> on_path = y - from_array<N>(offset.angle);
+    JointVector<N> gravity;
+    model_.gravity.evaluate(ProgramInput{on_path.data()}, gravity.data());
+    return model.inertia * from_array<N>(offset.acceleration) + model.gravity - gravity;
+  }
 
   DesignModel model_;
   double sample_period_s_;

@@ -149,5 +149,53 @@ class Plant:
     def mass_matrix(self, angle: npt.ArrayLike) -> _Array:
         """M(theta), kg m^2, shape (joints, joints)."""
 
+class ControlLoop:
+    """One controller with its start, its policy and its limits."""
+
+    def __init__(self, artifact: Artifact, trajectory: Trajectory, bumpless_start: bool = False) -> None: ...
+    def handle(self, seq: int, angle: npt.ArrayLike, speed: npt.ArrayLike, foreign_messages: int = 0) -> None:
+        """Answer the reading of a sample newer than the last; the clock is seq T."""
+
+    def reset_fault(self) -> bool:
+        """Leave a latched fault; whether that was possible."""
+
+    @property
+    def torque(self) -> _Array:
+        """N m, of the last command, shape (joints,)."""
+
+    @property
+    def state(self) -> str: ...
+    @property
+    def cause(self) -> str: ...
+    @property
+    def flags(self) -> int:
+        """Fault bits of the last command."""
+
+    @property
+    def predicted_steps(self) -> int: ...
+    @property
+    def faults(self) -> int: ...
+    @property
+    def refusal(self) -> str | None:
+        """Why there was no start, in one line; None if there was one."""
+
+class PlantSession:
+    """The plant of a scenario, sample by sample, behind its sensors."""
+
+    def __init__(self, scenario: Scenario, sample_period_s: float) -> None: ...
+    @property
+    def seq(self) -> int: ...
+    @property
+    def samples(self) -> int: ...
+    def measure(self) -> tuple[_Array, _Array]:
+        """Measured (angle, speed) of the sample, each of shape (joints,)."""
+
+    @property
+    def angle(self) -> _Array: ...
+    @property
+    def speed(self) -> _Array: ...
+    def advance(self, torque: npt.ArrayLike) -> None:
+        """Integrate over the sample under a torque (N m)."""
+
 def run_closed_loop(artifact: Artifact, trajectory: Trajectory, scenario: Scenario) -> dict[str, _Array]:
     """The closed loop in lock-step: columns by name, shape (samples,) or (samples, joints)."""

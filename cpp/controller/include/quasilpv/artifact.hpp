@@ -1,7 +1,9 @@
 // The controller as data: an immutable, validated artifact (docs/reference/formats.md).
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -132,6 +134,11 @@ struct Interval {
 struct OperatingDomain {
   std::array<Interval, kMaxJoints> angle_rad{};
   std::array<Interval, kMaxJoints> speed_rad_s{};
+
+  /// Largest magnitude of the speeds of a joint, rad/s. RT-SAFE.
+  double fastest(std::size_t joint) const noexcept {
+    return std::max(std::abs(speed_rad_s[joint].low), std::abs(speed_rad_s[joint].high));
+  }
 };
 
 /// A validated artifact. Immutable, self-contained: it keeps no reference to the bytes it came from.

@@ -22,9 +22,9 @@ class ControlLaw {
   /// Forgets all state. RT-SAFE (bounded, no allocation, no lock, no throw).
   virtual void reset() noexcept = 0;
 
-  /// Forgets all state but continues from the torque in force, N m: Limiter::take_over(). RT-SAFE (bounded, no
-  /// allocation, no lock, no throw).
-  virtual void take_over(const JointArray& in_force, double ramp_s) noexcept = 0;
+  /// Forgets all state, for a robot that moves already: the slew limit holds from the torque in force, N m, and the
+  /// first valid measurement finds the joints at `speed`, rad/s. RT-SAFE (bounded, no allocation, no lock, no throw).
+  virtual void take_over(const JointArray& in_force, const JointArray& speed) noexcept = 0;
 
  protected:
   ControlLaw() = default;

@@ -25,9 +25,8 @@ class Controller {
   /// Forgets all state; the next step starts the observer at the measurement. RT-SAFE.
   void reset() noexcept;
 
-  /// Forgets all state but begins at the torque `in_force`, N m, and leaves it without a bump: for `ramp_s` no sample
-  /// changes the torque by more than 2 torque_nm T / ramp_s (Limiter::take_over()). RT-SAFE.
-  void take_over(const JointArray& in_force, double ramp_s) noexcept;
+  /// Forgets all state, for a robot that moves already: see ControlLaw::take_over(). RT-SAFE.
+  void take_over(const JointArray& in_force, const JointArray& speed) noexcept;
 
   int joints() const noexcept;
   double sample_period_s() const noexcept;

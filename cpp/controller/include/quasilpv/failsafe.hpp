@@ -18,15 +18,18 @@ enum class ControllerState : std::int32_t {
 /// Why a fault was latched (`event_v2::detail[0]` of EventCode::kFault).
 enum class FaultCause : std::int32_t {
   kNone = 0,
-  kMeasurementLost = 1,    ///< too many consecutive invalid or missing measurements
-  kPlantSilent = 2,        ///< no measurement for too long (real time)
-  kDeadlineOverrun = 3,    ///< too many consecutive overruns
-  kForeignMessages = 4,    ///< too many consecutive messages of another session or artifact
-  kPremiseOutsideBox = 5,  ///< outside the operating domain for too long
-  kStopRequested = 6,      ///< SIGINT or SIGTERM: a stop like a fault, but not an error
-  kSecondPlant = 7,        ///< two plants speak in this session
-  kSecondController = 8,   ///< two controllers speak in this session
-  kPlantFailed = 9         ///< the plant said that it cannot go on
+  kMeasurementLost = 1,          ///< too many consecutive invalid or missing measurements
+  kPlantSilent = 2,              ///< no measurement for too long (real time)
+  kDeadlineOverrun = 3,          ///< too many consecutive overruns
+  kForeignMessages = 4,          ///< too many consecutive messages of another session or artifact
+  kPremiseOutsideBox = 5,        ///< outside the operating domain for too long
+  kStopRequested = 6,            ///< SIGINT or SIGTERM: a stop like a fault, but not an error
+  kSecondPlant = 7,              ///< two plants speak in this session
+  kSecondController = 8,         ///< two controllers speak in this session
+  kPlantFailed = 9,              ///< the plant said that it cannot go on
+  kMeasurementImplausible = 10,  ///< too many consecutive invalid or missing measurements, the last one implausible
+  kSpeedBeyondDomain = 11,       ///< too many consecutive estimated speeds beyond what the domain allows
+  kStartRefused = 12             ///< the first measurement is outside the operating domain: no torque was commanded
 };
 
 const char* to_string(ControllerState state) noexcept;
@@ -35,6 +38,7 @@ const char* to_string(FaultCause cause) noexcept;
 /// When the policy gives up.
 struct FailsafeSettings {
   std::int64_t invalid_limit = 20;                ///< fault at so many consecutive invalid or missing measurements
+  std::int64_t speed_limit = 20;                  ///< fault at so many consecutive speeds beyond the domain
   std::int64_t overrun_limit = 20;                ///< fault above so many consecutive overruns
   std::int64_t foreign_limit = 100;               ///< fault at so many consecutive foreign messages
   std::int64_t premise_degraded_ns = 20'000'000;  ///< degraded when outside the box for longer
@@ -52,6 +56,9 @@ struct FailsafeFlags {
   bool plant_silent = false;
   bool stop_requested = false;
   FaultCause demanded = FaultCause::kNone;  ///< why the robot's side says that this run cannot go on
+  bool measurement_implausible = false;     ///< the last of the invalid measurements came, but cannot be true
+  std::int64_t consecutive_speeds = 0;      ///< estimated speeds beyond what the domain allows, up to this one
+  bool start_refused = false;
 };
 
 /// What the policy remembers from one sample to the next.

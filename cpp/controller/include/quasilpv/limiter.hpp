@@ -37,19 +37,15 @@ class Limiter {
   /// Forgets the last torque. RT-SAFE.
   void reset() noexcept;
 
-  /// Begins at a torque that is already in force, for a start without a bump: for `ramp_s` from now on no sample
-  /// changes the torque by more than 2 torque_nm T / ramp_s either, so that the whole range is within reach at its end.
-  /// RT-SAFE. \param in_force N m, finite; saturated here. \param ramp_s   0: only the slew limit holds.
-  void take_over(const JointArray& in_force, double ramp_s) noexcept;
+  /// Begins at a torque that is already in force: the slew limit holds from there. RT-SAFE. \param in_force N m,
+  /// finite; saturated here.
+  void take_over(const JointArray& in_force) noexcept;
 
  private:
   bool is_finite(const JointArray& torque) const noexcept;
 
   TorqueLimits limits_;
-  double sample_period_s_;
   JointArray max_change_{};
-  JointArray ramp_change_{};
-  std::int64_t ramp_samples_left_ = 0;
   std::size_t joints_;
   JointArray last_{};
   bool started_ = false;

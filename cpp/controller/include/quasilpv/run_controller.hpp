@@ -24,6 +24,7 @@ enum class ControllerRunEnd {
   kStopped,         ///< SIGINT or SIGTERM; the safe torque was sent
   kFault,           ///< `exit_on_fault`
   kRefused,         ///< the robot's side runs in another way
+  kStartRefused,    ///< ControlLoop::refusal(); no command was sent
   kPlantSilent,     ///< no measurement for `timeout_s`
   kPlantNeverHeard  ///< no measurement at all
 };

@@ -25,10 +25,6 @@ class SafeTorque {
   /// INIT-ONLY.
   SafeTorque(const Artifact& artifact, SafeAction action);
 
-  /// G(y), saturated: what holds a resting arm where it is, in the artifact's model; 0 where that is not finite.
-  /// RT-SAFE (bounded, no allocation, no lock, no throw).
-  JointArray hold(const JointArray& angle) const noexcept;
-
   /// The mixture (1 - share) from + share Gamma_safe, moved from `last` by at most the slew limit of one sample and
   /// saturated. RT-SAFE (bounded, no allocation, no lock, no throw).
   ///

@@ -27,18 +27,22 @@ struct StepInput {
   JointArray angle{};
   JointArray speed{};
   Reference reference{};
+  bool joining = false;  ///< the reference is off its path by `offset` (JoiningSegment)
+  Reference offset{};
 };
 
 /// Fault bits: 0 is healthy.
 enum StepFlag : std::uint32_t {
   kStepHealthy = 0,
-  kMeasurementInvalid = 1u << 0,  ///< missing, NaN or infinite measurement: predicted instead
-  kPremiseOutsideBox = 1u << 1,   ///< a premise was clamped to its box
-  kTorqueSaturated = 1u << 2,     ///< at least one joint at its torque limit
-  kSlewLimited = 1u << 3,         ///< at least one joint at its slew limit
-  kTorqueNotFinite = 1u << 4,     ///< the law produced NaN or Inf: the last torque was kept
-  kReferenceInvalid = 1u << 5,    ///< NaN or Inf in the reference: the last valid reference was kept, at rest
-  kModelInvalid = 1u << 6         ///< gravity not finite or design inertia not positive definite here
+  kMeasurementInvalid = 1u << 0,      ///< missing, NaN or infinite measurement: predicted instead
+  kPremiseOutsideBox = 1u << 1,       ///< a premise was clamped to its box
+  kTorqueSaturated = 1u << 2,         ///< at least one joint at its torque limit
+  kSlewLimited = 1u << 3,             ///< at least one joint at its slew limit
+  kTorqueNotFinite = 1u << 4,         ///< the law produced NaN or Inf: the last torque was kept
+  kReferenceInvalid = 1u << 5,        ///< NaN or Inf in the reference: the last valid reference was kept, at rest
+  kModelInvalid = 1u << 6,            ///< gravity not finite or design inertia not positive definite here
+  kMeasurementImplausible = 1u << 7,  ///< the measurement cannot be true (Plausibility): predicted instead
+  kSpeedBeyondDomain = 1u << 8  ///< the estimated speed of a joint is beyond what the domain allows (Plausibility)
 };
 
 /// Result of one step. Disturbances of `dob-acceleration` are accelerations (rad/s^2), of the other laws torques (N m).

@@ -25,7 +25,14 @@ FAULT_CAUSES = (
     "second plant on this session",
     "second controller on this session",
     "plant failed",
+    "measurement implausible",
+    "speed beyond the domain",
+    "start refused",
 )
+
+TORQUE_SATURATED, SLEW_LIMITED = 1 << 2, 1 << 3
+AT_LIMIT = TORQUE_SATURATED | SLEW_LIMITED
+"""Bits of the flags of a step in which a limit acted."""
 
 
 def word(words: Sequence[str], code: int) -> str:
