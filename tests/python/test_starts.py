@@ -1,0 +1,125 @@
+"""F11: how controllers start, against the bounds on motion and first torque; robots by laws by plants by starts.
+
+The quick tier runs a fixed sample of the table; the whole of it is marked `full` and printed (``pytest -m full -s``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quasilpv.errors import ClaimError, InfeasibleError
+from quasilpv.experiments import designs
+from quasilpv.experiments.start import Start, StartOutcome, joining_speed, start
+from quasilpv.scenarios import build_scenario, tracking_task
+from quasilpv.synthesis import CONTROLLERS, Specification
+from quasilpv.systems.registry import robot
+
+TRACKING = tuple(name for name in CONTROLLERS if name not in ("pdc", "descriptor", "robust", "delayed"))
+TABLE = (
+    *(("serial-square", name) for name in TRACKING if name != "dob-torque-premultiplied"),
+    *(("fivebar-spiral", name) for name in TRACKING),
+    *((scenario, name) for scenario in ("stabilise-arm2", "stabilise-arm2-upright") for name in ("pdc", "descriptor")),
+    ("stabilise-arm2", "dob-acceleration"),
+    ("stabilise-arm2", "delayed"),
+    ("stabilise-arm3", "pdc"),
+    ("stabilise-spring-disc", "robust"),
+)
+"""Scenario, which knows its robot, and controller."""
+QUICK = (
+    ("serial-square", "dob-acceleration", "perturbed", tuple(Start)),
+    ("serial-square", "pid", "perturbed", (Start.BESIDE, Start.RESTART)),
+    ("serial-square", "ctc-dob", "nominal", (Start.RESET,)),
+    ("fivebar-spiral", "ctc", "perturbed", (Start.BESIDE, Start.RESTART)),
+)
+QUICK_S = 0.8
+LINE = "{:24}{:26}{:11}{:20}{:>10}{:>10}{:>12}{:>12}"
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("designs")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the table; the outcome is None where there is no such design."""
+
+    scenario: str
+    controller: str
+    plant: str
+    kind: Start
+    outcome: StartOutcome | None
+    why: str = ""
+
+    def __str__(self) -> str:
+        if self.outcome is None:
+            return LINE.format(self.scenario, self.controller, self.plant, self.kind, *"----") + f"  {self.why}"
+        found = self.outcome
+        fast = int(np.argmax(found.speed_rad_s / found.allowed_speed_rad_s))
+        step = int(np.argmax(found.step_nm / found.allowed_step_nm))
+        numbers = (found.speed_rad_s[fast], found.allowed_speed_rad_s[fast], found.step_nm[step])
+        cells = [f"{number:.4g}" for number in (*numbers, found.allowed_step_nm[step])]
+        return LINE.format(self.scenario, self.controller, self.plant, self.kind, *cells)
+
+
+def row(scenario: str, controller: str, plant: str, kind: Start, *, cache: Path, seconds: float | None = None) -> Row:
+    """Design, start, and compare; with ``seconds`` the run is cut to that time."""
+    task = tracking_task(scenario)
+    source = robot(task.robot)
+    wanted = Specification(
+        rate_hz=CONTROLLERS[controller].rate_hz, disturbance_frequency_rad_s=source.disturbance_frequency_rad_s
+    )
+    try:
+        artifact = designs.kept_design(source.id, controller, wanted, folder=cache)
+    except (InfeasibleError, ClaimError) as error:
+        return Row(scenario, controller, plant, kind, None, str(error))
+    trajectory = task.trajectory(source.model, source.domain)
+    experiment = build_scenario(source, trajectory, plant="perturbed" if plant == "perturbed" else "nominal")
+    if seconds is not None:
+        experiment = experiment.model_copy(update={"duration_s": seconds})
+    at_s = 0.4 * experiment.duration_s
+    return Row(scenario, controller, plant, kind, start(artifact, trajectory, experiment, kind, at_s=at_s))
+
+
+@pytest.mark.parametrize(
+    ("scenario", "controller", "plant", "kind"), [(*case[:3], kind) for case in QUICK for kind in case[3]]
+)
+def test_F11_robots_and_laws_start_gently_on_every_plant(
+    scenario: str, controller: str, plant: str, kind: Start, cache: Path
+) -> None:
+    found = row(scenario, controller, plant, kind, cache=cache, seconds=QUICK_S)
+    assert found.outcome is not None
+    assert found.outcome.holds, str(found)
+
+
+@pytest.mark.full
+def test_F11_the_whole_table_of_starts_is_within_its_bounds(tmp_path: Path, cache: Path) -> None:
+    heading = ("scenario", "controller", "plant", "start", "rad/s", "allowed", "step N m", "allowed")
+    lines = [LINE.format(*heading)]
+    beyond = []
+    for scenario, controller in TABLE:
+        for plant in ("nominal", "perturbed"):
+            for kind in Start:
+                found = row(scenario, controller, plant, kind, cache=cache)
+                lines.append(str(found))
+                print(lines[-1], flush=True)
+                if found.outcome is not None and not found.outcome.holds:
+                    beyond.append(str(found))
+    (tmp_path / "start-table.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert not beyond, "\n".join([lines[0], *beyond])
+
+
+def test_the_speed_of_joining_is_that_of_the_quintic_whatever_the_start(cache: Path) -> None:
+    source = robot("arm3")
+    artifact = designs.kept_design("arm3", "pid", Specification(), folder=cache)
+    fastest = np.abs(artifact.domain.speed_rad_s).max(axis=1)
+    beside = joining_speed(artifact, np.array([0.1, 0.0, 0.0]), np.zeros(3))
+    assert beside[1] == beside[2] == 0.0
+    assert 0.0 < beside[0] <= 0.25 * fastest[0] * (1 + 1e-9)
+    assert source.domain.speed_rad_s[0][1] == fastest[0]
+    falling = joining_speed(artifact, np.zeros(3), np.array([0.0, -0.7, 0.0]))
+    np.testing.assert_allclose(falling, [0.0, 0.7, 0.0], rtol=1e-12)
