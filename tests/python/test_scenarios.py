@@ -40,6 +40,7 @@ from quasilpv.trajectories.document import write_trajectory
 ARM3 = robot("arm3")
 TRAJECTORIES = {task.id: task.trajectory(ARM3.model, ARM3.domain) for task in tracking_tasks() if task.robot == "arm3"}
 SQUARE = TRAJECTORIES["serial-square"]
+DISTURBED = build_scenario(ARM3, SQUARE, external_torque=tracking_task("serial-square").external_torque)
 FORMATS = Path(__file__).parents[2] / "docs" / "reference" / "formats.md"
 
 
@@ -99,8 +100,8 @@ def test_when_the_plant_is_perturbed_expect_chapter_iv_with_inertias_about_the_c
     assert perturbed[2].inertia_kg_m2 == pytest.approx(7.783456)
 
 
-def test_when_nothing_is_said_expect_the_disturbance_and_sensors_of_the_thesis() -> None:
-    scenario = build_scenario(ARM3, SQUARE)
+def test_the_scenarios_of_the_arm_have_the_disturbance_of_the_thesis_and_the_default_sensors_are_its_too() -> None:
+    scenario = build_scenario(ARM3, SQUARE, external_torque=tracking_task("serial-square").external_torque)
     terms = [(t.joint, t.amplitude_nm, t.frequency_rad_s, t.phase_rad) for t in scenario.external_torque]
     assert terms == [(0, 450.0, 15.0, 0.0), (1, 375.0, 15.0, 0.0), (2, 300.0, 15.0, 0.0)]
     assert (scenario.sensors.encoder_bits, scenario.sensors.velocity_noise_rad_s) == (20, 0.05)
@@ -134,7 +135,7 @@ def five_bar_document() -> dict[str, Any]:
     passive = active.model_copy(update={"inertia_kg_m2": 0.0007})
     plant = FiveBarPlant(label="legs", gravity_m_s2=9.81, active=active, passive=passive)
     return {
-        **build_scenario(ARM3, SQUARE).to_document(),
+        **DISTURBED.to_document(),
         "plant": plant.model_dump(mode="json"),
         "external_torque": [],
         "initial": {"angle_rad": [-0.8, 0.8], "speed_rad_s": [0.0, 0.0]},
@@ -153,7 +154,7 @@ def spring_disc_document() -> dict[str, Any]:
         damping_n_s_m=2.0,
     )
     return {
-        **build_scenario(ARM3, SQUARE).to_document(),
+        **DISTURBED.to_document(),
         "plant": plant.model_dump(mode="json"),
         "external_torque": [],
         "initial": {"angle_rad": [-2.5], "speed_rad_s": [5.0]},
@@ -283,7 +284,7 @@ def test_when_the_sensor_filters_speeds_expect_the_recursion_of_the_format() -> 
     ],
 )
 def test_when_a_scenario_breaks_a_rule_expect_one_line_with_its_field(change: Callable, field: str) -> None:
-    document = json.loads(json.dumps(build_scenario(ARM3, SQUARE).to_document()))
+    document = json.loads(json.dumps(DISTURBED.to_document()))
     change(document)
     with pytest.raises(InputError) as error:
         Scenario.from_document(document, "scenario.json")
@@ -309,7 +310,7 @@ def test_when_a_scenario_file_is_not_strict_json_expect_input_error_with_its_nam
     ],
 )
 def test_when_a_member_with_a_default_is_missing_in_a_file_expect_it_refused(path: tuple, field: str) -> None:
-    document = build_scenario(ARM3, SQUARE).to_document()
+    document = DISTURBED.to_document()
     parent = document
     for key in path[:-1]:
         parent = parent[key]

@@ -6,7 +6,7 @@ not proved or that fails its robust gate, unless that is asked for; then the art
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ from quasilpv.certificate import CHECKERS, Evidence, gate, verify
 from quasilpv.errors import ClaimError
 from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, TrackingDesign, synthesise, without_compensation
 from quasilpv.synthesis.acceleration_design import Progress, no_progress
+from quasilpv.synthesis.actuator_demand import MotionsOf, no_motions, unmet_demands
 from quasilpv.synthesis.baselines import reference_speeds
 from quasilpv.systems.registry import Robot, robot
 
@@ -53,6 +54,7 @@ def release(
     specification: Specification | None = None,
     *,
     disturbance_compensation: bool = True,
+    motions_of: MotionsOf = no_motions,
     allow_unverified: bool = False,
     progress: Progress = no_progress,
 ) -> Release:
@@ -63,47 +65,53 @@ def release(
         controller: one of `quasilpv.synthesis.CONTROLLERS`.
         specification: what is asked for.
         disturbance_compensation: see `without_compensation`.
-        allow_unverified: release a design whose claims do not hold or that fails its gate, marked as such.
+        motions_of: what a robot is asked for; its limits must deliver them.
+        allow_unverified: release a design whose claims do not hold, that fails its gate or whose limits cannot deliver
+            what it needs, marked as such.
         progress: called with (points done, points in all).
 
     Raises:
         InputError: unknown robot or controller, or a law that cannot do without compensation.
         InfeasibleError: no design meets the specification.
-        ClaimError: a claim does not hold, or the robust gate is not passed.
+        ClaimError: a claim does not hold, the robust gate is not passed, or the limits are too tight.
     """
     design = synthesise(robot(robot_id), controller, specification, progress=progress)
     if not disturbance_compensation:
         design = without_compensation(design)
-    return Release(checked_artifact(design, allow_unverified), design.report)
+    return Release(checked_artifact(design, allow_unverified, motions_of), design.report)
 
 
-def checked_artifact(design: TrackingDesign, allow_unverified: bool = False) -> Artifact:
+def checked_artifact(
+    design: TrackingDesign, allow_unverified: bool = False, motions_of: MotionsOf = no_motions
+) -> Artifact:
     """The artifact of a design, its claims and its robust gate decided on the very numbers that are shipped.
 
     Args:
         design: of a law; the baselines make no claim and have no gate.
         allow_unverified: do not refuse, but write ``"released_unverified": true`` into the artifact.
+        motions_of: what a robot is asked for; its limits must deliver them.
 
     Raises:
-        ClaimError: a claim does not hold or is not proved, or the robust gate is not passed.
+        ClaimError: a claim does not hold or is not proved, the robust gate is not passed, or torque or slew limits
+            cannot deliver what the design needs.
     """
     content = to_artifact(design).content()
+    failures = list(unmet_demands(design, motions_of))
     if design.law["kind"] not in CHECKERS:
-        return Artifact.from_document(content)
+        _refuse(content["name"], failures, allow_unverified)
+        return Artifact.from_document({**content, **_released_unverified(failures, content["verification"])})
     verdict = verify(content, content["name"])
     samples = float(design.inputs["specification"]["delay_samples"])
     found = gate(content, content["name"], fmpq(*samples.as_integer_ratio())).to_document()
     of_gate = NEEDED_OF_GATE.get(design.law["kind"], Evidence.SAMPLED)
-    failures = [f"{claim.name}: does not hold ({claim.evidence})" for claim in verdict.claims if not claim.holds]
+    failures += [f"{claim.name}: does not hold ({claim.evidence})" for claim in verdict.claims if not claim.holds]
     for claim in verdict.weaker_than(NEEDED_OF_CLAIMS):
         failures.append(f"{claim.name}: {claim.evidence}, {NEEDED_OF_CLAIMS} evidence is needed")
     if not found["passed"]:
         failures.append(_why_not_passed(found))
     elif not Evidence(found["evidence"]).is_at_least(of_gate):
         failures.append(f"robust gate: {found['evidence']}, {of_gate} evidence is needed")
-    if failures and not allow_unverified:
-        more = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
-        raise ClaimError(f"{content['name']}: not released: {failures[0]}{more}")
+    _refuse(content["name"], failures, allow_unverified)
     evidence = {
         **(content["verification"] or {}),
         "schema_version": VERIFICATION_VERSION,
@@ -111,9 +119,19 @@ def checked_artifact(design: TrackingDesign, allow_unverified: bool = False) -> 
         "certificate": verdict.findings(),
         "gate": found,
     }
-    if failures:
-        evidence["released_unverified"] = True
-    return Artifact.from_document({**content, "verification": evidence})
+    return Artifact.from_document({**content, "verification": evidence, **_released_unverified(failures, evidence)})
+
+
+def _refuse(name: str, failures: Sequence[str], allow_unverified: bool) -> None:
+    """Refuse a design with failures, unless it is wanted all the same."""
+    if failures and not allow_unverified:
+        more = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
+        raise ClaimError(f"{name}: not released: {failures[0]}{more}")
+
+
+def _released_unverified(failures: Sequence[str], evidence: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The member `verification` of an artifact that is released in spite of failures; nothing without any."""
+    return {"verification": {**(evidence or {}), "released_unverified": True}} if failures else {}
 
 
 def _why_not_passed(found: Mapping[str, Any]) -> str:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from quasilpv.artifact.canonical import (
@@ -29,6 +30,7 @@ from quasilpv.artifact.programs import MAX_JOINTS
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError, one_of
 from quasilpv.files import read_bytes, write_readable_json
+from quasilpv.synthesis.actuator_demand import Motion
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.systems.registry import Robot
 from quasilpv.trajectories import Trajectory, fivebar_spiral, rest, serial_circle, serial_square
@@ -270,9 +272,14 @@ class TrackingTask:
     summary: str
     robot: str
     trajectory: Callable[[Kinematics, OperatingDomain | None], Trajectory]
-    external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE
+    external_torque: tuple[SineTorque, ...] = ()
     initial_angle_rad: Vector | None = None
     initial_speed_rad_s: Vector | None = None
+
+
+def _serial(name: str, summary: str, trajectory: Callable[..., Trajectory]) -> TrackingTask:
+    """A path of the 3-DoF arm under (III.53)."""
+    return TrackingTask(name, summary, "arm3", trajectory, EXTERNAL_TORQUE)
 
 
 def _stabilisation(name: str, summary: str, robot_id: str, joints: int) -> TrackingTask:
@@ -290,8 +297,8 @@ def _spiral(name: str, disturbance: str, *terms: tuple[float, float]) -> Trackin
 def tracking_tasks() -> tuple[TrackingTask, ...]:
     """Return all tracking experiments, in a fixed order."""
     return (
-        TrackingTask("serial-square", "the 3-DoF arm draws a square of 0.4 m in 3 s", "arm3", serial_square),
-        TrackingTask("serial-circle", "the 3-DoF arm draws 3/4 of a circle of 0.2 m in 3 s", "arm3", serial_circle),
+        _serial("serial-square", "the 3-DoF arm draws a square of 0.4 m in 3 s", serial_square),
+        _serial("serial-circle", "the 3-DoF arm draws 3/4 of a circle of 0.2 m in 3 s", serial_circle),
         _spiral("fivebar-spiral", "15 N m at 50 and 5 rad/s", (15.0, 50.0), (15.0, 5.0)),
         _spiral("fivebar-spiral-fast", "15 N m at 50 rad/s on both joints", (15.0, 50.0), (15.0, 50.0)),
         _spiral("fivebar-spiral-strong", "100 N m at 50 rad/s on both joints", (100.0, 50.0), (100.0, 50.0)),
@@ -322,6 +329,24 @@ def tracking_task(name: str) -> TrackingTask:
     return known[name]
 
 
+def motions_of(robot: Robot, sample_period_s: float = 1e-3) -> tuple[Motion, ...]:
+    """What the registered experiments ask of a robot: their references and the peaks of their external torques."""
+    motions = []
+    for task in tracking_tasks():
+        if task.robot != robot.id:
+            continue
+        trajectory = task.trajectory(robot.model, robot.domain)
+        reference = trajectory.evaluate(np.arange(0.0, trajectory.duration_s, sample_period_s))
+        peak, rate = np.zeros((2, robot.model.joints))
+        for term in task.external_torque:
+            peak[term.joint] += abs(term.amplitude_nm)
+            rate[term.joint] += abs(term.amplitude_nm * term.frequency_rad_s)
+        motions.append(
+            Motion(task.id, reference.angle, reference.speed, reference.acceleration, peak, rate, sample_period_s)
+        )
+    return tuple(motions)
+
+
 def build_scenario(
     robot: Robot,
     trajectory: Trajectory,
@@ -329,7 +354,7 @@ def build_scenario(
     plant: Literal["nominal", "perturbed"] = "perturbed",
     sensors: Sensors | None = None,
     integrator: IdaIntegrator | Rk4Integrator | None = None,
-    external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE,
+    external_torque: tuple[SineTorque, ...] = (),
     transport_delay_s: float = 0.0,
     initial_angle_rad: Vector | None = None,
     initial_speed_rad_s: Vector | None = None,
@@ -344,7 +369,7 @@ def build_scenario(
             centres of mass unchanged).
         sensors: default ``Sensors()``.
         integrator: default ``IdaIntegrator()``.
-        external_torque: sines on the joints, default (III.53).
+        external_torque: sines on the joints; default: none.
         transport_delay_s: time from a sample to the moment its torque acts.
         initial_angle_rad: start at these angles; default: on the reference, moving with it.
         initial_speed_rad_s: start there with these speeds; default: at rest.

@@ -31,6 +31,7 @@ def synthetic_run(samples: int, joints: int) -> Run:
         filtered_disturbance=20.0 * ripple,
         torque_nm=300.0 * ripple,
         flags=np.zeros(samples, dtype=np.int64),
+        premise_excess=np.zeros(samples),
     )
 
 

@@ -8,6 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
@@ -17,7 +18,7 @@ from quasilpv.experiments.logged import logged_result
 from quasilpv.figures.gallery import write_gallery
 from quasilpv.files import claim_file, claim_folder
 from quasilpv.telemetry import RunLog
-from quasilpv.telemetry.codes import event_in_words
+from quasilpv.telemetry.codes import AT_LIMIT, event_in_words
 from quasilpv.telemetry.log import ARTIFACT, HEADER, Messages
 from quasilpv.telemetry.mcap_export import write_mcap
 from quasilpv.telemetry.replay import replay
@@ -86,6 +87,9 @@ def _about(log: RunLog) -> dict[str, Any]:
     about["sessions"] = sorted(sessions)
     about["incomplete_bytes"] = log.incomplete_bytes
     about["telemetry_drops"] = int(telemetry.records["drops"].max(initial=0))
+    if telemetry.samples.size:
+        about["share_at_limit"] = float(np.mean((telemetry.samples["flags"] & AT_LIMIT) != 0))
+        about["largest_premise_excess"] = float(np.max(telemetry.samples["premise_excess"]))
     return about
 
 

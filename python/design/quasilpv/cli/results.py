@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from quasilpv.cli.console import print_table
+from quasilpv.cli.console import print_note, print_table
 from quasilpv.experiments.result import TrackResult
 
 COLUMNS = (
@@ -19,6 +19,22 @@ COLUMNS = (
     "speed error\nrms rad/s",
     "growth rate\n1/s",
 )
+
+
+def print_warnings(result: TrackResult, label: str = "") -> None:
+    """Say on stderr where a run was outside of what is proved: at a limit, or outside the box of the premises.
+
+    Args:
+        result: of the run.
+        label: what to call it; by default scenario and variant.
+    """
+    about = f"warning: {label or result.title}"
+    if result.metrics.share_at_limit > 0.0:
+        share = f"a torque or slew limit acted in {100.0 * result.metrics.share_at_limit:.3g} % of the samples"
+        print_note(f"{about}: {share}; certificate and gate hold while none does")
+    if result.metrics.largest_premise_excess > 0.0:
+        excess = f"a premise was outside its box by up to {result.metrics.largest_premise_excess:.3g} of its width"
+        print_note(f"{about}: {excess}; certificate and gate hold inside")
 
 
 def print_results(results: Sequence[TrackResult]) -> None:

@@ -23,6 +23,7 @@ from quasilpv.files import claim_folder
 MARGIN_FIGURE, GROWTH_FIGURE = "inertia-margin", "growth-rate"
 BEYOND_THE_MARGIN = fmpq(3, 2)
 SHORTEST_CURVE_SAMPLES = fmpq(1)
+WHILE = "while no torque or slew limit acts"
 
 
 def robust_command(
@@ -91,7 +92,7 @@ def _grid_answer(found: GridGate) -> tuple[list[tuple[str, str]], str]:
         ("loops", f"{len(found.plants)} ({len(found.plants.angles)} postures, {len(found.plants.inertia)} payloads)"),
     ]
     if found.passed:
-        return rows, "passed: stable at every point of the grid (frozen loop); a grid check, not a proof"
+        return rows, f"passed: stable at every point of the grid (frozen loop), {WHILE}; a grid check, not a proof"
     return rows, "NOT passed: a loop of the grid is not stable up to the specified delay"
 
 
@@ -134,9 +135,10 @@ def _verdict(gate: RobustGate) -> str:
     if gate.motion is False:
         return "NOT passed: that one Lyapunov function is common to all motions is claimed and not proved"
     if gate.passed and gate.motion:
-        return "passed: proved for every motion, payload and constant delay up to the specified one"
+        return f"passed: proved for every motion, payload and constant delay up to the specified one, {WHILE}"
     if gate.passed:
-        return "passed: proved for every posture, payload and constant delay up to the specified one (frozen loop)"
+        proved = "every posture, payload and constant delay up to the specified one (frozen loop)"
+        return f"passed: proved for {proved}, {WHILE}"
     if gate.margin is None:
         return "NOT passed: with the specified delay the loop is not stable even with the design inertia"
     if gate.needed is None:

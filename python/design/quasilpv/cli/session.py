@@ -10,7 +10,13 @@ from quasilpv.artifact import Artifact
 from quasilpv.cli.console import Steps, print_note, progress
 from quasilpv.cli.options import designed, sensors_of
 from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
+from quasilpv.experiments.track import (
+    PlantKind,
+    TrackingExperiment,
+    disturbance_beyond_limits,
+    start_outside_domain,
+    track,
+)
 from quasilpv.figures.gallery import write_comparison, write_gallery
 from quasilpv.files import claim_folder
 from quasilpv.telemetry import LOG_NAME
@@ -49,9 +55,13 @@ class Session:
 
     def run(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> TrackResult:
         """Design, if no controller is given, and run one variant in closed loop."""
+        controller = self.controller(experiment, variant, steps)
+        for doubt in (disturbance_beyond_limits, start_outside_domain):
+            if found := doubt(experiment, controller):
+                print_note(f"warning: {experiment.name}, {variant.label}: {found}")
         result = track(
             experiment,
-            self.controller(experiment, variant, steps),
+            controller,
             self.folder(experiment, variant),
             plant=self.plant,
             sensors=sensors_of(variant.encoder_bits),

@@ -20,6 +20,7 @@ from quasilpv.cli.options import (
 )
 from quasilpv.files import claim_folder
 from quasilpv.release import release
+from quasilpv.scenarios import motions_of
 from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, Specification
 from quasilpv.systems.registry import robot
 
@@ -49,7 +50,7 @@ def synth_command(
     """Design a controller, check what it claims, and write its artifact, as JSON and as CBOR.
 
     Exit code 1, and nothing written, if no design meets the specification, if an inequality does not hold in exact
-    arithmetic, or if the robust gate is not passed.
+    arithmetic, if the robust gate is not passed, or if the torque or slew limits cannot deliver what the design needs.
 
     \b
     Example:
@@ -80,7 +81,9 @@ def write_released(
     """
     with progress(1) as steps:
         steps.begin(f"{design} for {robot_id}")
-        made = release(robot_id, design, wanted, allow_unverified=allow_unverified, progress=steps.parts)
+        made = release(
+            robot_id, design, wanted, motions_of=motions_of, allow_unverified=allow_unverified, progress=steps.parts
+        )
         steps.end()
     paths = write_artifact(out, made.artifact)
     return {

@@ -20,7 +20,7 @@ from quasilpv.cli.options import (
     require_controller,
     sensors_of,
 )
-from quasilpv.cli.results import print_results
+from quasilpv.cli.results import print_results, print_warnings
 from quasilpv.cli.session import Session, draw_results
 from quasilpv.errors import InputError
 from quasilpv.experiments.result import TrackResult, Variant
@@ -99,6 +99,8 @@ def track_command(
         print_json([result.row() for result in results])
     else:
         print_results(results)
+    for result in results:
+        print_warnings(result)
 
 
 def run_all(

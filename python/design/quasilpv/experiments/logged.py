@@ -51,7 +51,7 @@ def logged_run(log: RunLog) -> Run:
     if not seq.size:
         raise InputError(log.source, "QLPV_TRUTH", "no sample", "the true motion of the plant beside QLPV_TELEMETRY")
     telemetry, truth, n, T = telemetry[told], truth[true], log.artifact.joints, log.artifact.sample_period_s
-    columns = {"time_s": seq * T, "flags": telemetry["flags"]}
+    columns = {"time_s": seq * T, "flags": telemetry["flags"], "premise_excess": telemetry["premise_excess"]}
     columns |= columns_of("QLPV_TELEMETRY", telemetry, n) | columns_of("QLPV_TRUTH", truth, n)
     return run_from_columns(columns, n, T)
 

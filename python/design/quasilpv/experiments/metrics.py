@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.telemetry.codes import AT_LIMIT
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,9 @@ class Metrics:
         rms_torque_nm: sqrt(mean over samples of the sum over joints of torque^2).
         rms_torque_increment_nm: the same of the differences of the torque between consecutive samples.
         rms_velocity_error_rad_s: the same of estimated minus true joint speed.
+        share_at_limit: share of the samples in which a torque or slew limit acted on a joint. There the loop is open,
+            and no certificate or gate speaks of it.
+        largest_premise_excess: largest distance of a premise from its box, in widths of that box; 0 if none left it.
     """
 
     rms_x_m: float
@@ -31,6 +35,8 @@ class Metrics:
     rms_torque_nm: float
     rms_torque_increment_nm: float
     rms_velocity_error_rad_s: float
+    share_at_limit: float
+    largest_premise_excess: float
 
     def as_dict(self) -> dict[str, float]:
         """The metrics by name, in the order of the attributes."""
@@ -72,4 +78,6 @@ def compute_metrics(run: Run, tool_position: Callable[[FloatArray], FloatArray])
         rms_torque_nm=rms_over_samples(run.torque_nm),
         rms_torque_increment_nm=rms_over_samples(np.diff(run.torque_nm, axis=0)),
         rms_velocity_error_rad_s=rms_over_samples(run.estimated_speed_rad_s - run.true_speed_rad_s),
+        share_at_limit=float(np.mean((run.flags & AT_LIMIT) != 0)),
+        largest_premise_excess=float(np.max(run.premise_excess)),
     )

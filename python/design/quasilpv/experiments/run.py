@@ -31,6 +31,7 @@ class Run:
         filtered_disturbance: (N, n) the estimate as the torque compensates it.
         torque_nm: (N, n) applied torque, after the limits.
         flags: (N,) fault bits of the step; 0 is healthy.
+        premise_excess: (N,) largest distance of a premise from its box, in widths of that box; 0 inside.
     """
 
     sample_period_s: float
@@ -47,6 +48,7 @@ class Run:
     filtered_disturbance: FloatArray
     torque_nm: FloatArray
     flags: IntArray
+    premise_excess: FloatArray
 
     @property
     def joints(self) -> int:

@@ -19,7 +19,6 @@ from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import FloatArray, Run
 from quasilpv.scenarios import (
-    EXTERNAL_TORQUE,
     Sensors,
     SineTorque,
     build_scenario,
@@ -47,7 +46,7 @@ class TrackingExperiment:
         name: scenario id, or the name in the path file.
         robot: from the registry.
         trajectory: the reference.
-        external_torque: sines on the joints.
+        external_torque: sines on the joints; none unless stated.
         initial_angle_rad: angles of the plant at t = 0; None to start on the reference.
         initial_speed_rad_s: its speeds then; None for rest.
     """
@@ -55,7 +54,7 @@ class TrackingExperiment:
     name: str
     robot: Robot
     trajectory: Trajectory
-    external_torque: tuple[SineTorque, ...] = EXTERNAL_TORQUE
+    external_torque: tuple[SineTorque, ...] = ()
     initial_angle_rad: tuple[float, ...] | None = None
     initial_speed_rad_s: tuple[float, ...] | None = None
 
@@ -185,6 +184,28 @@ def track(
     return summarise(run, experiment, artifact, plant=plant, sensors=sensors, variant=variant)
 
 
+def disturbance_beyond_limits(experiment: TrackingExperiment, artifact: Artifact) -> str | None:
+    """Half a line if the external torque of a joint exceeds what its actuator has; None if all can be withstood."""
+    peak = np.zeros(experiment.robot.model.joints)
+    for term in experiment.external_torque:
+        peak[term.joint] += abs(term.amplitude_nm)
+    limit = np.array(artifact.limits.torque_nm)
+    joint = int(np.argmax(peak / limit))
+    if peak[joint] <= limit[joint]:
+        return None
+    return f"an external torque of {peak[joint]:.4g} N m on joint {joint}, whose torque limit is {limit[joint]:.4g} N m"
+
+
+def start_outside_domain(experiment: TrackingExperiment, artifact: Artifact) -> str | None:
+    """Half a line if a joint starts where no controller over a wire would: outside the operating domain; else None."""
+    start = experiment.initial_angle_rad or experiment.trajectory.evaluate(0.0).angle
+    for joint, (angle, (low, high)) in enumerate(zip(start, artifact.domain.angle_rad, strict=True)):
+        if high - low < 2.0 * np.pi and not low <= angle <= high:
+            interval = f"outside its operating domain, {low:.4g} to {high:.4g} rad"
+            return f"joint {joint} starts at {angle:.4g} rad, {interval}: there nothing is proved"
+    return None
+
+
 def run_documents(
     mode: Mode, files: RunFiles, experiment: TrackingExperiment, artifact: Artifact, variant: Variant
 ) -> RunDocuments:
@@ -226,6 +247,7 @@ def run_from_columns(columns: dict[str, FloatArray], joints: int, sample_period_
         filtered_disturbance=per_joint("filtered_disturbance"),
         torque_nm=per_joint("torque_applied_nm"),
         flags=columns["flags"].astype(np.int64),
+        premise_excess=columns["premise_excess"],
     )
 
 
