@@ -25,7 +25,7 @@ from quasilpv.experiments.logged import logged_result, mechanism_of
 from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.release import release
-from quasilpv.scenarios import Sensors, build_scenario
+from quasilpv.scenarios import EXTERNAL_TORQUE, Sensors, build_scenario
 from quasilpv.synthesis import Specification
 from quasilpv.systems.registry import robot, robots
 from quasilpv.telemetry import LOG_NAME, Event, RunLog, latest_log, read_events, read_log, write_events
@@ -50,7 +50,11 @@ def artifact() -> Artifact:
 @pytest.fixture(scope="module")
 def experiment() -> TrackingExperiment:
     """A quick one: the arm holds a posture against the disturbance."""
-    return TrackingExperiment("hold", robot("arm3"), rest("hold", 3, SAMPLES * 1e-3))
+    still = rest("hold", 3, SAMPLES * 1e-3)
+    posture = TrackingExperiment.registered("serial-square").trajectory.evaluate(0.0).angle
+    coefficients = still.coefficients + np.eye(1, 6)[None] * posture[None, :, None]
+    trajectory = replace(still, coefficients=coefficients)
+    return TrackingExperiment("hold", robot("arm3"), trajectory, EXTERNAL_TORQUE)
 
 
 @pytest.fixture(scope="module")

@@ -214,7 +214,13 @@ def test_when_quantisation_and_noise_are_off_expect_ida_and_rk4_to_agree(control
     reference = _runtime.Trajectory.parse(canonical_json(experiment.trajectory.to_document()))
 
     def angles(integrator: IdaIntegrator | Rk4Integrator) -> FloatArray:
-        scenario = build_scenario(experiment.robot, experiment.trajectory, sensors=EXACT, integrator=integrator)
+        scenario = build_scenario(
+            experiment.robot,
+            experiment.trajectory,
+            sensors=EXACT,
+            integrator=integrator,
+            external_torque=experiment.external_torque,
+        )
         return _runtime.run_closed_loop(artifact, reference, runtime_scenario(scenario))["angle_rad"]
 
     difference = np.abs(angles(IdaIntegrator()) - angles(Rk4Integrator()))
@@ -229,7 +235,10 @@ def test_when_the_plant_is_the_model_expect_the_true_disturbance_to_be_the_exter
     experiment = TrackingExperiment.registered("serial-square")
     artifact = release("arm3", "ctc-dob").artifact
     runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()))
-    scenario = build_scenario(experiment.robot, experiment.trajectory, plant="nominal", sensors=EXACT)
+    torque = experiment.external_torque
+    scenario = build_scenario(
+        experiment.robot, experiment.trajectory, plant="nominal", sensors=EXACT, external_torque=torque
+    )
     columns = _runtime.run_closed_loop(
         runtime,
         _runtime.Trajectory.parse(canonical_json(experiment.trajectory.to_document())),
@@ -299,12 +308,13 @@ def test_when_records_miss_different_samples_expect_the_common_ones_matched_by_n
 
     def table(path: Path, columns: list[str], samples: list[int], extra: str) -> Path:
         names = ",".join(["seq", "time_s", *(f"{name}_{j}" for name in columns for j in range(2)), extra])
-        rows = [",".join(map(str, [k, k * 1e-3, *([k + 0.25, k + 0.5] * len(columns)), 0])) for k in samples]
+        last = [0] * (1 + extra.count(","))
+        rows = [",".join(map(str, [k, k * 1e-3, *([k + 0.25, k + 0.5] * len(columns)), *last])) for k in samples]
         return write_csv(path, names, rows)
 
     run = merge_records(
         table(tmp_path / "plant.csv", plant_columns, [0, 1, 3, 4], "command_delay_s"),
-        table(tmp_path / "controller.csv", controller_columns, [1, 2, 3], "flags"),
+        table(tmp_path / "controller.csv", controller_columns, [1, 2, 3], "flags,premise_excess"),
         artifact,
     )
     np.testing.assert_array_equal(run.time_s, [1e-3, 3e-3])

@@ -268,6 +268,7 @@ def _run_both(commands: dict[str, list[str]], limit_s: float) -> tuple[dict[str,
             time.sleep(POLL_S)
         for name, process in processes.items():
             if process.returncode not in (None, 0, EXIT_FAULT_STOP):
+                _raise_refused_start(processes[CONTROLLER])
                 _raise_failure(name, process)
         said = {name: process.communicate() for name, process in processes.items()}
         stopped = [name for name, process in processes.items() if process.returncode == EXIT_FAULT_STOP]
@@ -278,6 +279,14 @@ def _run_both(commands: dict[str, list[str]], limit_s: float) -> tuple[dict[str,
             if process.poll() is None:
                 process.terminate()
             process.communicate()
+
+
+def _raise_refused_start(controller: subprocess.Popen[str]) -> None:
+    """Raise what stopped a controller that never began: then it is the reason why the other side heard nothing."""
+    if controller.returncode == EXIT_FAULT_STOP:
+        report, errors = controller.communicate()
+        if json.loads(report)["end"] == "start refused":
+            raise FaultStop(errors.strip().splitlines()[-1])
 
 
 def _raise_failure(program: str, process: subprocess.Popen[str]) -> None:
