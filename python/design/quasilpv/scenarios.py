@@ -329,7 +329,7 @@ def tracking_task(name: str) -> TrackingTask:
     return known[name]
 
 
-def motions_of(robot: Robot, sample_period_s: float = 1e-3) -> tuple[Motion, ...]:
+def motions_of(robot: Robot, sample_period_s: float = 0.02) -> tuple[Motion, ...]:
     """What the registered experiments ask of a robot: their references and the peaks of their external torques."""
     motions = []
     for task in tracking_tasks():
