@@ -1,5 +1,6 @@
 """What a user calls things: one name is one thing, nothing is declared in vain, and what is refused is named."""
 
+import math
 import pickle
 from fractions import Fraction
 from math import inf, nan
@@ -190,6 +191,50 @@ def test_equilibrium_shifts_exactly_and_what_is_left_is_reported() -> None:
         DescriptorSystem.from_equations(equations, **tank, equilibrium=({"h": 0.3}, {"q": 0.5477}))
     with pytest.raises(InputError, match="an interval that holds the equilibrium"):
         DescriptorSystem.from_equations(equations, **tank, equilibrium=({"h": 1}, {"q": 1}))
+
+
+def test_an_equilibrium_in_doubles_of_a_balance_of_large_terms_is_one() -> None:
+    """A boost converter: 12 = (1 - d) v + i/10 and (1 - d) i = 50/v up to the rounding of i and d."""
+    i0 = (12 - math.sqrt(144 - 20)) / 0.2
+    model = DescriptorSystem.from_equations(
+        ["0.001*i' = 12 - (1-d)*v - 0.1*i", "0.0001*v' = (1-d)*i - 50/v"],
+        state="i v",
+        inputs="d",
+        domain={"i": (0, 20), "v": (20, 30)},
+        equilibrium=({"i": i0, "v": 24.0}, {"d": 1 - (12 - 0.1 * i0) / 24}),
+    )
+    assert max(map(abs, model.disturbance), default=0.0) < 1e-13
+
+
+def test_premises_of_a_shifted_quotient_have_values_of_size_one() -> None:
+    """A magnet: the doubles of the equilibrium must not become factors of 2^-180."""
+    current = 0.01 * math.sqrt(981.0)
+    model = DescriptorSystem.from_equations(
+        ["x' = v", "v' = 9.81 - 0.01*i**2/x**2", "i' = u - i"],
+        name="magnet",
+        state="x v i",
+        inputs="u",
+        domain={"x": (0.005, 0.02), "i": (0.1, 1)},
+        equilibrium=({"x": 0.01, "i": current}, {"u": current}),
+    )
+    for premise in model.premises:
+        assert premise.upper - premise.lower > 1e-3
+        assert max(abs(premise.lower), abs(premise.upper)) < 1e7
+    for x, i in [(-0.004, 0.1), (0.005, -0.2), (0.0, 0.0)]:
+        _, A, _, _ = model.evaluate(model.premise_values([x, 0.0, i]))
+        force = 9.81 - 0.01 * (current + i) ** 2 / (0.01 + x) ** 2
+        assert_allclose((A @ [x, 0.0, i])[1], force, rtol=1e-11, atol=1e-11)
+
+
+def test_two_ways_of_writing_one_term_make_no_premise_that_is_zero() -> None:
+    model = DescriptorSystem.from_equations(
+        ["c' = -c - (1 + c)*exp(T/(1 + T/20)) + u + 1", "T' = -T + exp(T/(1 + T/20))/2 - 1/2"],
+        state="c T",
+        inputs="u",
+        domain={"c": (-0.5, 0.5), "T": (-1, 1)},
+    )
+    assert len(model.premises) == 2
+    assert all(premise.lower < premise.upper for premise in model.premises)
 
 
 # ---- what the controller can compute ---------------------------------------------------------------------------------

@@ -101,6 +101,12 @@ def test_sums_that_are_proportional_up_to_rounding_share_a_premise() -> None:
     assert_allclose(A[0], [float(first.subs(x, 0.7)), float(second.subs(x, 0.7))], rtol=1e-14)
 
 
+def test_a_small_number_of_a_large_term_is_not_taken_for_rounding() -> None:
+    system = own(one_row(x + 1e-14 * sp.exp(20 * x), sp.S.Zero))
+    A = system.evaluate(system.premise_values([2.0, 1.0])).A
+    assert_allclose(A[0, 0], 2.0 + 1e-14 * np.exp(40.0), rtol=1e-9)
+
+
 def test_functions_that_only_look_dependent_on_the_domain_stay_apart() -> None:
     # sin(x) = x within 2e-11 of its size here, which is no identity.
     narrow = {x: (-1e-5, 1e-5)}

@@ -169,7 +169,7 @@ class DescriptorSystem:
     @classmethod
     def from_equations(
         cls,
-        equations: Sequence[Formula],
+        equations: str | Sequence[Formula],
         *,
         name: str = "system",
         state: str | Sequence[Name],
@@ -212,7 +212,8 @@ class DescriptorSystem:
         names = Vocabulary(name, state, inputs, domain, unknown=unknown, constants=constants)
         around = Equilibrium.of(names, equilibrium)
         shown = [each.name for each in names.state] if outputs is None else outputs
-        matrices = equation_matrices(names, equations, [shown] if isinstance(shown, str) else shown, around)
+        listed = [equations] if isinstance(equations, str) else equations
+        matrices = equation_matrices(names, listed, [shown] if isinstance(shown, str) else shown, around)
         names.finish()
         return cls._of(
             names,

@@ -102,10 +102,11 @@ def equation_matrices(
     source, state, inputs = names.source, names.state, names.inputs
     if len(equations) != len(state):
         raise InputError(source, "equations", f"{len(equations)} equations", f"{len(state)}, one for each state")
-    residuals = [
-        equilibrium.of_deviations(exact(names.read(f"equation {number}", equation, rates=True, inputs=True)))
+    given = [
+        exact(names.read(f"equation {number}", equation, rates=True, inputs=True))
         for number, equation in enumerate(equations, 1)
     ]
+    residuals = [equilibrium.of_deviations(equation) for equation in given]
     rates = [rate(name) for name in state]
     if not any(residual.has(*rates) for residual in residuals):
         expected = "a rate, x' or rate(x): x.diff(t) of a symbol x is 0"
@@ -123,7 +124,8 @@ def equation_matrices(
         field = f"{source}: equation {row + 1}"
         constant, entries = split(field, -residuals[row].subs(at_rest), ordered, algebraic)
         drift.append(entries)
-        constants.append(_left_over(field, constant, -residuals[row].subs(at_rest), state))
+        terms = [equilibrium.at(term.subs(dict.fromkeys(rates, 0)), names) for term in expanded(given[row])]
+        constants.append(_left_over(field, constant, terms))
     measured = []
     for number, output in enumerate(outputs, 1):
         whole = exact(names.read(f"output {number}", output))
@@ -143,16 +145,20 @@ def equation_matrices(
     )
 
 
-def _left_over(field: str, constant: sp.Expr, drift: sp.Expr, state: Sequence[sp.Symbol]) -> float:
+def _left_over(field: str, constant: sp.Expr, terms: Sequence[sp.Expr]) -> float:
     """The constant of an equation at the equilibrium if it is rounding, which is reported as a disturbance.
+
+    Args:
+        field: which equation, for messages.
+        constant: what its terms sum to at the equilibrium.
+        terms: what they are there.
 
     Raises:
         InputError: it is more than `RESIDUAL` of the row, or depends on a parameter.
     """
     if constant == 0:
         return 0.0
-    at_zero = dict.fromkeys(state, 0)
-    size = sum((sp.Abs(sp.N(term.subs(at_zero))) for term in expanded(drift)), sp.S.Zero)
+    size = sum((sp.Abs(sp.N(term)) for term in terms), sp.S.Zero)
     if constant.is_number and size.is_number and abs(sp.N(constant)) <= RESIDUAL * size:
         return float(constant)
     expected = "0: give the equilibrium, equilibrium=(x0, u0), or make it an input"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
-from math import inf, isfinite
+from math import inf, isfinite, log2
 
 import numpy as np
 import sympy as sp
@@ -23,6 +23,7 @@ Domain = Mapping[sp.Symbol, tuple[float, float]]
 _SAMPLING_RANGE = 3.0  # of an interval that is unbounded or missing
 _DEPENDENT = 1e-9  # relative distance from the span of other terms that makes a dependence worth proving
 _LARGEST_DENOMINATOR = 1000
+_SMALL = 1e-6  # values of a premise
 
 
 def find_premises(
@@ -31,7 +32,7 @@ def find_premises(
     """Premises z1, z2, ... in which all entries of some matrices are affine, and the matrices as such.
 
     Known and unknown parts of an entry never share a premise. Premises are numbered in the order in which their leading
-    terms appear, known ones first; each is scaled so that its leading term has the factor 1.
+    terms appear, known ones first; each is scaled so that its leading term has the factor 1, or its values size 1.
 
     Args:
         matrices: of nonlinear expressions.
@@ -43,7 +44,11 @@ def find_premises(
     """
     entries = [[expansion(entry) for entry in matrix] for matrix in matrices]
     terms = list(dict.fromkeys(term for numbers in _flat(entries) for term in numbers if term != 1))
-    relations = _proved_relations(terms, domain)
+    samples = _sampled(terms, domain)
+    sizes = {
+        t: sp.Rational(float(s)) for t, s in zip(terms, np.abs(samples).max(axis=0, initial=0.0), strict=True) if s
+    }
+    relations = _proved_relations(terms, samples)
     entries = [[_rewritten(numbers, relations) for numbers in matrix] for matrix in entries]
     parts: dict[PremiseKind, list[Expansion]] = {PremiseKind.MEASURED: [], PremiseKind.UNKNOWN: []}
     for numbers in _flat(entries):
@@ -52,19 +57,35 @@ def find_premises(
     found = [
         (leading, vector, kind)
         for kind, vectors in parts.items()
-        for leading, vector in _reduced_basis(vectors, terms).items()
+        for leading, vector in _reduced_basis(vectors, terms, sizes).items()
     ]
+    written = [(leading, _readable(vector), kind) for leading, vector, kind in found]
+    constants = {leading: number for leading, number, _ in written if not number.free_symbols}  # terms that are equal
+    moving = [(leading, f, _scale(f, domain), kind) for leading, f, kind in written if f.free_symbols]
     premises = tuple(
-        Premise.over(domain, f"z{index}", _readable(vector), kind) for index, (_, vector, kind) in enumerate(found, 1)
+        Premise.over(domain, f"z{index}", scale * f, kind) for index, (_, f, scale, kind) in enumerate(moving, 1)
     )
     # No premise but its own holds a leading term, so its number in an entry is the coefficient of the premise.
-    leading_terms = [sp.S.One, *(leading for leading, _, _ in found)]
     affine = []
     for matrix, row in zip(matrices, entries, strict=True):
-        values = [[float(entry.get(term, 0)) for entry in row] for term in leading_terms]
-        stacked = np.array(values).reshape(len(leading_terms), *matrix.shape)
+        fixed = [entry.get(sp.S.One, 0) + sum(entry.get(t, 0) * c for t, c in constants.items()) for entry in row]
+        slopes = [[entry.get(leading, 0) / scale for entry in row] for leading, _, scale, _ in moving]
+        stacked = np.array([[float(value) for value in values] for values in (fixed, *slopes)])
+        stacked = stacked.reshape(len(moving) + 1, *matrix.shape)
         affine.append(AffineMatrix(stacked[0], stacked[1:]))
     return premises, affine
+
+
+def _scale(expression: sp.Expr, domain: Domain) -> sp.Rational:
+    """1, or the power of two that makes tiny or huge values about 1: bounds are proved to an absolute tolerance."""
+    largest = 0.0
+    for share in (0.25, 0.5, 0.8):
+        ends = {symbol: _bounded(*domain.get(symbol, (-inf, inf))) for symbol in expression.free_symbols}
+        value = sp.N(expression.subs({s: sp.Float(low + share * (high - low)) for s, (low, high) in ends.items()}))
+        largest = max(largest, abs(float(value)) if value.is_real and value.is_finite else 0.0)
+    if largest == 0.0 or _SMALL < largest < 1 / _SMALL:
+        return sp.S.One
+    return sp.Integer(2) ** -round(log2(largest))
 
 
 def dimension(entries: Iterable[Expansion]) -> int:
@@ -95,17 +116,23 @@ def _symbol_count(expression: sp.Expr) -> int:
     return sum(isinstance(node, sp.Symbol) for node in sp.preorder_traversal(expression))
 
 
-def _reduced_basis(vectors: Iterable[Expansion], order: Sequence[sp.Expr]) -> dict[sp.Expr, Expansion]:
-    """Reduced basis of the span of the vectors by leading term, which occurs in no other member of the basis."""
+def _reduced_basis(
+    vectors: Iterable[Expansion], order: Sequence[sp.Expr], sizes: Mapping[sp.Expr, sp.Expr] | None = None
+) -> dict[sp.Expr, Expansion]:
+    """Reduced basis of the span of the vectors by leading term, which occurs in no other member of the basis.
+
+    What is left of a term by rounding is dropped: its number times the size of the term is nothing beside the others.
+    """
+    size = sizes or {}
     rank = {term: position for position, term in enumerate(order)}
     basis: dict[sp.Expr, Expansion] = {}
     for vector in vectors:
-        scale = max((abs(number) for number in vector.values()), default=sp.S.Zero)
+        scale = max((abs(number) * size.get(term, 1) for term, number in vector.items()), default=sp.S.Zero)
         rest = dict(vector)
         for leading, member in basis.items():
             if leading in rest:
                 rest = _combined(rest, member, -rest[leading])
-        rest = {term: number for term, number in rest.items() if abs(number) > ROUNDING * scale}
+        rest = {term: number for term, number in rest.items() if abs(number) * size.get(term, 1) > ROUNDING * scale}
         if not rest:
             continue
         leading = min(rest, key=rank.__getitem__)
@@ -136,9 +163,8 @@ def _rewritten(numbers: Expansion, relations: Mapping[sp.Expr, Expansion]) -> Ex
 # ---- linear dependence of terms as functions -------------------------------------------------------------------------
 
 
-def _proved_relations(terms: Sequence[sp.Expr], domain: Domain) -> dict[sp.Expr, Expansion]:
+def _proved_relations(terms: Sequence[sp.Expr], samples: NDArray[np.float64]) -> dict[sp.Expr, Expansion]:
     """Terms that equal a combination of a constant and earlier terms, each with the combination."""
-    samples = _sampled(terms, domain)
     independent, relations = [sp.S.One], {}
     columns = [np.ones(len(samples))]
     for term, values in zip(terms, samples.T, strict=True):
