@@ -19,7 +19,7 @@ from quasilpv.cli.options import (
     require_controller,
     sensors_of,
 )
-from quasilpv.cli.results import COLUMNS, cells
+from quasilpv.cli.results import COLUMNS, cells, print_warnings
 from quasilpv.cli.session import Session
 from quasilpv.errors import FaultStop, InputError
 from quasilpv.experiments.hil import HilResult, RealTimeOptions, require_identical, run_over_lcm
@@ -96,6 +96,8 @@ def hil_command(
         print_json(_row(over_lcm, in_process))
     else:
         _print(over_lcm, in_process)
+    print_warnings(in_process, f"{in_process.title}, in process")
+    print_warnings(over_lcm.result, f"{in_process.title}, over LCM")
     if over_lcm.fault is not None:
         raise FaultStop(over_lcm.fault)
 
