@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import wraps
 from typing import Annotated, Any, TypeAlias, TypeVar
 
@@ -13,6 +14,7 @@ from quasilpv.cli.usage import NUMBER_EXPECTED, number
 from quasilpv.conditions.blocks import Slack
 from quasilpv.conditions.condition import Form, Options
 from quasilpv.errors import InputError
+from quasilpv.lmi.budget import DEFAULT_MEMORY_GIB, DEFAULT_TIME_S, Limits
 from quasilpv.polytopes.representation import REPRESENTATIONS
 from quasilpv.studies.boundary import Interval
 from quasilpv.studies.question import Question
@@ -62,6 +64,14 @@ SampleOption: TypeAlias = Annotated[
     float, typer.Option("--sample-period-s", help="Sample period of conditions on a sampled model, s.")
 ]
 
+TimeLimitOption: TypeAlias = Annotated[
+    float,
+    typer.Option("--time-limit", help="Seconds for an answer, or for a point of a map; then it is unknown."),
+]
+MemoryLimitOption: TypeAlias = Annotated[
+    float, typer.Option("--memory-limit", help="GiB for the solver; a larger problem is refused, with cheaper ways.")
+]
+
 
 def question(
     system: str,
@@ -91,10 +101,13 @@ def _stated(
     common: CommonOption = False,
     window_s: WindowOption = None,
     sample_period_s: SampleOption = Options.sample_period_s,
+    time_limit: TimeLimitOption = DEFAULT_TIME_S,
+    memory_limit: MemoryLimitOption = DEFAULT_MEMORY_GIB,
 ) -> Question:
     """The question of one condition; its parameters are the options of every verb that asks one."""
     options = Options(slack, decay, form, window_s=window_s, common=common, sample_period_s=sample_period_s)
-    return question(system, condition, representation, parameters, options)
+    asked = question(system, condition, representation, parameters, options)
+    return replace(asked, limits=Limits(time_limit, memory_limit))
 
 
 def asks_one_question(verb: Callable[..., Result]) -> Callable[..., Result]:

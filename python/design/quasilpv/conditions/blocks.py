@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.conditions.slack import Slack, slack_family
-from quasilpv.errors import InputError
-from quasilpv.lmi import Expression, Problem, Variable, block, zeros
+from quasilpv.lmi import Expression, Problem, Variable, block, budget, zeros
+from quasilpv.lmi.budget import TooLargeError
 from quasilpv.lmi.exact import Matrix
 from quasilpv.lmi.expressions import Operand, as_expression
 
@@ -83,11 +83,11 @@ def require_affordable(count: int, sums: int) -> None:
         sums: how many sums over them.
 
     Raises:
-        InputError: there would be more than `MAX_INEQUALITIES`.
+        TooLargeError: there would be more than `MAX_INEQUALITIES`.
     """
     if count**sums > MAX_INEQUALITIES:
         expected = f"at most {MAX_INEQUALITIES}: a representation of fewer vertices"
-        raise InputError("condition", "inequalities", f"{count**sums} on {count} vertices", expected)
+        raise TooLargeError("condition", "inequalities", f"{count**sums} on {count} vertices", expected)
 
 
 def double_sum(
@@ -119,10 +119,11 @@ def double_sum(
         The slack matrices.
 
     Raises:
-        InputError: there would be more than `MAX_INEQUALITIES`.
+        TooLargeError: there would be more than `MAX_INEQUALITIES`, or their cones alone exceed the memory limit.
     """
     require_affordable(count, 2 + others)
     size = entry(*(0,) * (2 + others)).shape[0]
+    budget.require_cones(count ** (2 + others), size)
     shift = slack_family(slack, name, slack_blocks, size, sums=2 + others)
     own = Fraction(2, max(count - 1, 1))
     for rest in product(range(count), repeat=others):

@@ -86,7 +86,7 @@ def gains_on_differential(
 
     Args:
         extended: vertices of ``A_e + alpha E_o``, (count, N, N).
-        inputs: B, (n, m), of full column rank.
+        inputs: B, (n, m).
         lyapunov: P_e, (N, N).
         differential: q.
 
@@ -96,12 +96,21 @@ def gains_on_differential(
     q = differential
     product = extended @ lyapunov
     Q = product + product.transpose(0, 2, 1)
+    basis, back = _independent(inputs)
     weighted = np.linalg.solve(
-        -Q[:, q:, q:], np.concatenate([np.broadcast_to(inputs, (len(Q), *inputs.shape)), Q[:, q:, :q]], axis=2)
+        -Q[:, q:, q:], np.concatenate([np.broadcast_to(basis, (len(Q), *basis.shape)), Q[:, q:, :q]], axis=2)
     )
-    m = inputs.shape[1]
-    normal = inputs.T @ weighted
-    return np.asarray(-np.linalg.solve(normal[:, :, :m], normal[:, :, m:]))
+    k = basis.shape[1]
+    normal = basis.T @ weighted
+    return np.asarray(-back @ np.linalg.solve(normal[:, :, :k], normal[:, :, k:]))
+
+
+def _independent(inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Columns R that span those of B, (n, k), and what makes them of B: ``B S = R``, S (m, k)."""
+    basis = scipy.linalg.orth(inputs) if inputs.size else inputs
+    if basis.shape[1] == inputs.shape[1]:
+        return inputs, np.eye(inputs.shape[1])
+    return basis, np.linalg.pinv(inputs) @ basis
 
 
 def completed(lyapunov: FloatArray, model: PolytopicModel) -> FloatArray:
@@ -135,10 +144,12 @@ def gains_on_extended(extended: FloatArray, inputs: FloatArray, lyapunov: FloatA
     Returns:
         M_i, (count, m, N).
     """
-    m = inputs.shape[1]
-    orthonormal, _ = np.linalg.qr(inputs, mode="complete")
-    basis = np.hstack([orthonormal[:, m:], inputs @ np.linalg.inv(inputs.T @ inputs)])
+    acting, back = _independent(inputs)
+    k = acting.shape[1]
+    orthonormal, _ = np.linalg.qr(acting, mode="complete")
+    basis = np.hstack([orthonormal[:, k:], acting @ np.linalg.inv(acting.T @ acting)])
     product = extended @ lyapunov
     Q = basis.T @ (product + product.transpose(0, 2, 1)) @ basis
-    own = -0.5 * (Q[:, -m:, -m:] + np.abs(product).mean() * np.eye(m))
-    return np.asarray(np.concatenate([-Q[:, -m:, :-m], own], axis=2) @ np.linalg.inv(basis))
+    free = len(basis) - k
+    own = -0.5 * (Q[:, free:, free:] + np.abs(product).mean() * np.eye(k))
+    return np.asarray(back @ np.concatenate([-Q[:, free:, :free], own], axis=2) @ np.linalg.inv(basis))

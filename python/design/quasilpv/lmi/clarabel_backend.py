@@ -15,6 +15,7 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
+from quasilpv.lmi import budget
 from quasilpv.lmi.assembly import gradient, unpack, upper_triangle
 from quasilpv.lmi.expressions import Expression, Variable
 from quasilpv.lmi.raw_solution import RawSolution
@@ -55,6 +56,9 @@ def _settings() -> clarabel.DefaultSettings:
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1
+    left = budget.time_left_s()
+    if left is not None:
+        settings.time_limit = left
     return settings
 
 

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
+from quasilpv.lmi import budget
 from quasilpv.lmi.assembly import unknown_offsets, unpack
 from quasilpv.lmi.exact import is_positive_triangle, over_common_denominator
 from quasilpv.lmi.expressions import Expression, Variable
@@ -173,6 +174,7 @@ class CompiledProblem:
         entries = np.where(self.layout.diagonal, 2 * entries, entries)
         start = 0
         for name, size in zip(self.layout.names, self.layout.sizes, strict=True):
+            budget.time_left_s()
             end = start + size * (size + 1) // 2
             if not is_positive_triangle(_triangle_rows(entries[start:end].tolist(), size)):
                 return name
@@ -314,6 +316,7 @@ class _Coefficients:
         parts: list[tuple[IndexArray, ExactArray, int]] = []
         start = 0
         for constraint in problem.constraints:
+            budget.time_left_s()
             for row, column, unknown, integers, denominator in _exact_entries(constraint.expression, offsets):
                 low, high = np.minimum(row, column), np.maximum(row, column)
                 parts.append(((start + high * (high + 1) // 2 + low) * stride + unknown + 1, integers, denominator))

@@ -13,11 +13,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import clarabel
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
+from quasilpv.lmi import worker
 from quasilpv.lmi.assembly import triangle_places
 from quasilpv.lmi.compiled import CompiledProblem, rounded
 from quasilpv.lmi.expressions import Variable
@@ -66,13 +66,14 @@ def decide(problem: CompiledProblem) -> Decision:
 
     Raises:
         ValueError: an inequality has a constant term.
+        TimeUpError: the time limit was reached (`quasilpv.lmi.budget`).
+        TooLargeError: the solver ran into the memory limit.
     """
     coefficients, offset = problem.matrix()
     if offset.any():
         raise ValueError("decide: the inequalities have constant terms, expected homogeneous ones")
-    solution = _solve(problem, coefficients)
-    status = str(solution.status)
-    point = np.asarray(solution.x)
+    solution = worker.solve(coefficients, -problem.layout.diagonal.astype(float), problem.layout.sizes)
+    status, point = solution.status, solution.x
     if np.all(np.isfinite(point)) and "Infeasible" not in status:
         candidate = rounded(point)
         if problem.holds_exactly(candidate):
@@ -88,7 +89,7 @@ def decide(problem: CompiledProblem) -> Decision:
         if status == "Solved":
             return Decision(Outcome.SOLVER_ONLY, solver_status=status, iterations=solution.iterations)
     if "PrimalInfeasible" in status:
-        excluded = _excluded_norm(problem, coefficients, np.asarray(solution.z))
+        excluded = _excluded_norm(problem, coefficients, solution.z)
         return Decision(
             Outcome.INFEASIBLE_NUMERICALLY,
             excluded_norm=excluded,
@@ -96,18 +97,6 @@ def decide(problem: CompiledProblem) -> Decision:
             iterations=solution.iterations,
         )
     return Decision(Outcome.UNKNOWN, solver_status=status, iterations=solution.iterations)
-
-
-def _solve(problem: CompiledProblem, coefficients: sparse.csc_matrix) -> clarabel.DefaultSolution:
-    unknowns = coefficients.shape[1]
-    identity = problem.layout.diagonal.astype(float)
-    cones = [clarabel.PSDTriangleConeT(size) for size in problem.layout.sizes]
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.max_threads = 1
-    settings.direct_solve_method = "faer"
-    quadratic = sparse.csc_matrix((unknowns, unknowns))
-    return clarabel.DefaultSolver(quadratic, np.zeros(unknowns), -coefficients, -identity, cones, settings).solve()
 
 
 def _margin(problem: CompiledProblem, entries: FloatArray) -> float:

@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from quasilpv.lmi import backends
+from quasilpv.lmi import backends, budget
 from quasilpv.lmi.backends import BackendName
 from quasilpv.lmi.exact import Matrix, is_positive_definite, symmetric_part, to_rational
 from quasilpv.lmi.expressions import Expression, Operand, Variable, as_expression, identity
@@ -97,6 +97,7 @@ class Problem:
 
         Raises:
             ValueError: the expression is not square, or the name is taken.
+            TimeUpError: the time limit was reached (`quasilpv.lmi.budget`).
         """
         square = as_expression(expression)
         if square.shape[0] != square.shape[1]:
@@ -105,6 +106,7 @@ class Problem:
             raise ValueError(f"{name}: there is already an inequality of that name")
         if square.shape[0] == 0:
             return
+        budget.time_left_s()  # writing a large problem down takes seconds
         self._names.add(name)
         self._constraints.append(Constraint(name, square))
 

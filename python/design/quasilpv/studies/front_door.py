@@ -11,6 +11,7 @@ from typing import Any, TypedDict, Unpack
 from quasilpv.conditions.condition import Form, Options
 from quasilpv.conditions.slack import Slack
 from quasilpv.errors import InputError
+from quasilpv.lmi.budget import DEFAULT, Limits
 from quasilpv.studies.answer import Answer
 from quasilpv.studies.boundary import RELATIVE_TOLERANCE, Boundary, Interval, find_boundary
 from quasilpv.studies.checkpoint import Forgetful
@@ -31,6 +32,8 @@ class QuestionOptions(TypedDict, total=False):
     window_s: float | None
     common: bool
     sample_period_s: float
+    time_limit_s: float | None
+    memory_limit_gib: float | None
 
 
 def solve(system: SystemLike, condition: str, **options: Unpack[QuestionOptions]) -> Answer:
@@ -41,7 +44,8 @@ def solve(system: SystemLike, condition: str, **options: Unpack[QuestionOptions]
             catalogue, ``FILE.py:NAME``, an entry point.
         condition: its id, e.g. ``"II.5"``.
         **options: ``representation`` (the published one by default), ``parameters`` of the system by name,
-            ``decay_rate`` (1/s), ``slack``, ``form``, ``window_s``, ``common``, ``sample_period_s``.
+            ``decay_rate`` (1/s), ``slack``, ``form``, ``window_s``, ``common``, ``sample_period_s``;
+            ``time_limit_s`` and ``memory_limit_gib`` of every answer, None for no limit (100 s and 4 GiB by default).
 
     Raises:
         InputError: something does not exist or does not fit; one line says what, what it got and what it expected.
@@ -112,14 +116,14 @@ def region(
 
 def question(system: SystemLike, condition: str, **options: Unpack[QuestionOptions]) -> Question:
     """The question that `solve` answers. Arguments and errors as there."""
-    own = ("representation", "parameters")
+    own = ("representation", "parameters", "time_limit_s", "memory_limit_gib")
     chosen: dict[str, Any] = {name: value for name, value in options.items() if name not in own}
     for name, kind in (("slack", Slack), ("form", Form)):
         if name in chosen:
             chosen[name] = _member(kind, name, chosen[name])
     unknown = set(chosen) - set(Options.__dataclass_fields__)
     if unknown:
-        known = ", ".join(["representation", "parameters", *Options.__dataclass_fields__])
+        known = ", ".join([*own, *Options.__dataclass_fields__])
         raise InputError("question", "option", ", ".join(sorted(unknown)), f"one of {known}")
     return Question(
         system if isinstance(system, str) else own_kind(system),
@@ -127,6 +131,7 @@ def question(system: SystemLike, condition: str, **options: Unpack[QuestionOptio
         options.get("representation", ""),
         tuple(options.get("parameters", {}).items()),
         Options(**chosen),
+        Limits(options.get("time_limit_s", DEFAULT.time_s), options.get("memory_limit_gib", DEFAULT.memory_gib)),
     )
 
 

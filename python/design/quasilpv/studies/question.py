@@ -16,12 +16,14 @@ from quasilpv.conditions.invertibility import proof_of_invertibility
 from quasilpv.conditions.registry import condition
 from quasilpv.conditions.reliance import RefusedError, Reliance, refuse_refuted
 from quasilpv.lmi import largest_margin
+from quasilpv.lmi.budget import Limits, limited
 from quasilpv.lmi.common import common_problem
 from quasilpv.lmi.compiled import CompiledFamily, CompiledProblem, compile_family
 from quasilpv.lmi.feasibility import decide
 from quasilpv.polytopes import PolytopicModel, polytopic_model
 from quasilpv.polytopes.scaling import ladder
 from quasilpv.polytopes.units import Units
+from quasilpv.studies.affordable import require_affordable, within_limits
 from quasilpv.studies.answer import Answer, Verdict
 from quasilpv.studies.examination import Case, Finding, examine, is_small, no_solution, solution, stated
 from quasilpv.studies.law import Law
@@ -42,6 +44,7 @@ class Question:
             published with.
         parameters: of the system, by name, in order of name; defaults for the others.
         options: of the condition.
+        limits: of the time and memory of every answer; no part of what is asked.
 
     Raises:
         InputError: there is no such system, parameter or condition.
@@ -52,6 +55,7 @@ class Question:
     representation: str = ""
     parameters: tuple[tuple[str, float], ...] = ()
     options: Options = field(default_factory=Options)
+    limits: Limits = field(default_factory=Limits, compare=False)
 
     def __post_init__(self) -> None:
         """Fill in the representation; refuse what does not exist."""
@@ -118,7 +122,8 @@ class Sweep:
         known = condition(question.condition)
         left = {Reliance.INVERTIBLE_E, Reliance.INDEX_ONE} if self.swept else set()  # these may depend on the point
         refuse_refuted(known.id, [one for one in known.relies_on if one not in left], question.model())
-        self._family = self._compile()
+        with limited(question.limits):
+            self._family = self._compile()
 
     @property
     def updates(self) -> bool:
@@ -131,8 +136,12 @@ class Sweep:
         Args:
             point: a value for every swept parameter.
         """
+        return within_limits(self.question, lambda: self._at(point))
+
+    def _at(self, point: Mapping[str, float]) -> Answer:
         start = time.perf_counter()
         compiled = self._problem([point])
+        require_affordable(self.question, compiled.layout)
         decision = decide(compiled)
         if decision.feasible:
             finding = solution(decision, 1)
@@ -255,12 +264,18 @@ def answered(question: Question) -> Answer:
 
     Raises:
         InputError: the condition does not apply to the system, or the representation does not.
+        TooLargeError: a solver would need more memory than it may have; names cheaper ways.
     """
+    return within_limits(question, lambda: _answered(question), alternatives=True)
+
+
+def _answered(question: Question) -> Answer:
     start = time.perf_counter()
     known, model = condition(question.condition), question.model()
     refuse_refuted(known.id, known.relies_on, model)
     statement = stated(known, model, question.options)
     compiled = CompiledProblem.of(statement.problem)
+    require_affordable(question, compiled.layout)
     decision = decide(compiled)
     finding = solution(decision, 1)
     if not decision.feasible:
@@ -277,7 +292,7 @@ def largest_or_reached_margin(question: Question, answer: Answer) -> float | Non
     In the units of the answer, or those fitted first if it is not feasible: the margin depends on them. Of a problem
     too large for the margin program, what the answer reached; None if it is not feasible.
     """
-    if not is_small(answer.rows, answer.unknowns):
+    if not answer.unknowns or not is_small(answer.rows, answer.unknowns):
         return answer.margin
     feasible = answer.verdict is Verdict.FEASIBLE
     units = answer.units if feasible else next(ladder(question.model().system))

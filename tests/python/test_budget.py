@@ -1,0 +1,145 @@
+"""Limits hold: memory before and while a solver works, time, and Ctrl-C; what is too large names cheaper ways."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy import sparse
+
+import quasilpv as ql
+from quasilpv.conditions.condition import Options
+from quasilpv.conditions.registry import CONDITIONS, condition
+from quasilpv.errors import InputError
+from quasilpv.lmi import budget, worker
+from quasilpv.lmi.budget import Limits, TimeUpError, TooLargeError
+from quasilpv.lmi.compiled import CompiledProblem
+from quasilpv.polytopes import polytopic_model
+from quasilpv.systems.catalogue import system
+from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.equations import rate
+
+ROOT = Path(__file__).parents[2]
+
+
+def quadrotor() -> DescriptorSystem:
+    """Roll, pitch, yaw kinematics and the rates of a rigid body: 6 states, 8 premises."""
+    phi, theta, psi, p, q, r = sp.symbols("phi theta psi p q r", real=True)
+    u = sp.symbols("u1:4", real=True)
+    s, c = sp.sin, sp.cos
+    tan = s(theta) / c(theta)
+    return DescriptorSystem.from_equations(
+        [
+            rate(phi) - (p + s(phi) * tan * q + c(phi) * tan * r),
+            rate(theta) - (c(phi) * q - s(phi) * r),
+            rate(psi) - (s(phi) / c(theta) * q + c(phi) / c(theta) * r),
+            rate(p) + q * r / 2 - 30 * u[0],
+            rate(q) - p * r / 2 - 25 * u[1],
+            rate(r) - p * q / 8 - 16 * u[2],
+        ],
+        name="quadrotor",
+        state=[phi, theta, psi, p, q, r],
+        inputs=list(u),
+        domain={phi: (-0.5, 0.5), theta: (-0.5, 0.5), p: (-2, 2), q: (-2, 2), r: (-1, 1)},
+    )
+
+
+def large_program(order: int = 30) -> tuple[sparse.csc_matrix, np.ndarray, list[int]]:
+    """A feasible program whose factorisation takes minutes: dense columns over many blocks."""
+    rng = np.random.default_rng(0)
+    rows = order * (order + 1) // 2
+    blocks = [sparse.random(rows, 2000, density=0.2, random_state=rng) for _ in range(24)]
+    return sparse.vstack(blocks).tocsc(), -np.ones(24 * rows), [order] * 24
+
+
+def test_a_time_limit_stops_the_solver() -> None:
+    start = time.monotonic()
+    with budget.limited(Limits(time_s=1.0)), pytest.raises(TimeUpError, match="limit of 1 s"):
+        worker.solve(*large_program())
+    assert time.monotonic() - start < 8.0
+
+
+def test_an_allocation_that_fails_does_not_end_this_process() -> None:
+    with budget.limited(Limits(memory_gib=0.05)), pytest.raises(TooLargeError, match=r"more than 0\.05 GiB"):
+        worker.solve(*large_program())
+
+
+def test_ctrl_c_does_not_wait_for_the_solver() -> None:
+    timer = threading.Timer(1.0, signal.raise_signal, (signal.SIGINT,))
+    timer.start()
+    start = time.monotonic()
+    with budget.limited(Limits(time_s=60.0)), pytest.raises(KeyboardInterrupt):
+        worker.solve(*large_program())
+    assert time.monotonic() - start < 8.0
+
+
+def test_a_process_of_its_own_gives_the_answer_of_this_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = polytopic_model(system("ex-I.1", b=2.0), "per-premise@0")
+    compiled = CompiledProblem.of(condition("II.6").build(model, Options()).problem)
+    program = (compiled.matrix()[0], -compiled.layout.diagonal.astype(float), compiled.layout.sizes)
+    here = worker.solve(*program)
+    monkeypatch.setattr(worker, "IN_PLACE", 0)
+    with budget.limited(Limits(time_s=60.0, memory_gib=1.0)):
+        apart = worker.solve(*program)
+    assert here.status == apart.status == "Solved"
+    assert np.array_equal(here.x, apart.x)
+
+
+def test_time_is_up_between_inequalities_too() -> None:
+    with budget.limited(Limits(time_s=1e-6)), pytest.raises(TimeUpError):
+        condition("II.5").build(polytopic_model(quadrotor(), "per-premise@0"), Options())
+
+
+def test_the_time_limit_of_a_question_makes_its_answer_unknown() -> None:
+    answer = ql.solve("ex-I.1", "II.6", time_limit_s=1e-4)
+    assert answer.verdict.value == "unknown"
+    assert "time limit" in answer.reason
+    assert "cheaper" in answer.reason
+
+
+def test_what_is_too_large_names_its_size_and_cheaper_ways_that_are_within_the_limit() -> None:
+    with pytest.raises(InputError, match=r"about .* GiB.*cheaper: .*--representation") as refused:
+        ql.solve("ex-I.1", "II.5", memory_limit_gib=1e-3)
+    assert "--common" in str(refused.value)
+
+
+@pytest.mark.parametrize("limits", [{"time_limit_s": 0.0}, {"memory_limit_gib": -1.0}, {"time_limit_s": float("nan")}])
+def test_limits_without_a_meaning_are_refused(limits: dict[str, float]) -> None:
+    with pytest.raises(InputError, match="limit"):
+        ql.solve("ex-I.1", "II.6", **limits)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_quadrotor_attitude_gets_an_answer_or_a_refusal_that_names_alternatives(name: str) -> None:
+    start = time.monotonic()
+    try:
+        answer = ql.solve(quadrotor(), name)
+    except InputError as error:
+        assert str(error)
+    else:
+        assert answer.reason
+    assert time.monotonic() - start < 120.0
+
+
+@pytest.mark.full
+def test_kill_int_ends_a_question_about_the_quadrotor(tmp_path: Path) -> None:
+    own = tmp_path / "own.py"
+    own.write_text(
+        f"import sys\nsys.path.insert(0, {str(ROOT / 'tests/python')!r})\nfrom test_budget import quadrotor\n"
+    )
+    asked = [sys.executable, "-m", "quasilpv", "solve", f"{own}:quadrotor", "-c", "II.6", "--memory-limit", "16"]
+    process = subprocess.Popen(asked, stderr=subprocess.PIPE)
+    time.sleep(15.0)
+    start = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    process.wait(10.0)
+    assert time.monotonic() - start < 2.0
+    assert process.returncode != 0
