@@ -95,6 +95,11 @@ class Size:
         return f"{self.unknowns} unknowns, {self.rows} rows, about {self.memory_gib:.2g} GiB"
 
 
+def at_most_gib(layout: Layout) -> float:
+    """What a solver needs if nothing at all is sparse, GiB: known at once."""
+    return 8.0 * FILL * (layout.rows + len(layout.kept)) ** 2 / 2.0 / GIB
+
+
 def estimate(layout: Layout) -> Size:
     """The size of a compiled problem.
 

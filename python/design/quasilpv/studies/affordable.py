@@ -65,7 +65,7 @@ def require_affordable(question: Question, layout: Layout) -> None:
         TooLargeError: it is one.
     """
     allowed = question.limits.memory_gib
-    if allowed is None:
+    if allowed is None or budget.at_most_gib(layout) <= allowed:
         return
     size = budget.estimate(layout)
     if size.memory_gib > allowed:

@@ -181,8 +181,12 @@ class Sweep:
         Raises:
             ValueError: the data are not affine in the swept parameters.
         """
+        return within_limits(self.question, lambda: self._common(points, rescaled))
+
+    def _common(self, points: Sequence[Mapping[str, float]], rescaled: bool) -> Answer:
         start = time.perf_counter()
         compiled = self._problem(points)
+        require_affordable(self.question, compiled.layout)
         decision, units = decide(compiled), None
         if rescaled and not decision.feasible and self._units is not None:
             decision, units = decide(self._problem(points, self._units)), self._units
@@ -200,7 +204,8 @@ class Sweep:
             witness, units: of the answer.
         """
         compiled = self._problem(points, units)
-        return len(witness) == len(compiled.layout.kept) and compiled.holds_exactly(np.array(witness))
+        holds = len(witness) == len(compiled.layout.kept) and compiled.holds_exactly(np.array(witness))
+        return holds and self._refused(points) is None
 
     def _problem(self, points: Sequence[Mapping[str, float]], units: Units | None = None) -> CompiledProblem:
         """The inequalities at all these points, in one set of unknowns."""
