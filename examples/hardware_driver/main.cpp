@@ -1,10 +1,10 @@
 // A controller with its driver in one process: hardware_driver ARTIFACT TRAJECTORY SECONDS
-#include <cstdlib>
 #include <exception>
 #include <iostream>
 #include <string>
 
 #include "drive_robot.hpp"
+#include "quasilpv/decimal.hpp"
 #include "quasilpv/loop.hpp"
 #include "quasilpv/run_controller.hpp"
 #include "quasilpv/run_report.hpp"
@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
     return kExitBadInput;
   }
   try {
-    return run(argv[1], argv[2], std::strtod(argv[3], nullptr));
+    return run(argv[1], argv[2], quasilpv::parse_number(argv[3], "hardware_driver", "SECONDS", 0.01, 86400.0));
   } catch (const std::exception& error) {
     std::cerr << "hardware_driver: " << error.what() << '\n';
     return kExitBadInput;

@@ -268,7 +268,7 @@ def test_F17_when_the_plant_cannot_be_integrated_expect_exit_6_with_flag_time_an
 ) -> None:
     path = experiment.folder / "scenario.json"
     document = json.loads(path.read_text())
-    document["external_torque"] = [{"joint": 0, "amplitude_nm": 1e300, "frequency_rad_s": 50.0, "phase_rad": 0.0}]
+    document["external_torque"] = [{"joint": 0, "amplitude_nm": 1e12, "frequency_rad_s": 50.0, "phase_rad": 0.0}]
     path.write_text(json.dumps(document))
     experiment.start(experiment.controller_command())
     code, _, errors = experiment.run(experiment.simulator_command())

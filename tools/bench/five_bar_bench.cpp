@@ -43,7 +43,7 @@ Json measure(const std::vector<std::string>& arguments) {
         return report;
       },
       [&](double time_s) { return swing(scenario.initial_angle, time_s); });
-  return measure_integrators(scenario, torques, kSamplePeriod, std::stoi(arguments[1]));
+  return measure_integrators(scenario, torques, kSamplePeriod, count(arguments[1]));
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ nlohmann::json measure(const std::vector<std::string>& arguments) {
     return arm.inverse_dynamics(state.angle, state.speed, state.acceleration);
   };
   const Timing timing = time_calls(
-      states.size(), std::stoi(arguments[2]), [] {}, [&](std::size_t i) { keep(torque(states[i])); });
+      states.size(), count(arguments[2]), [] {}, [&](std::size_t i) { keep(torque(states[i])); });
   return {{"timing", to_json(timing)}, {"torques_nm", torques_at(states, torque)}};
 }
 

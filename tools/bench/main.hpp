@@ -7,7 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "quasilpv/decimal.hpp"
+
 namespace quasilpv::bench {
+
+/// A number of things on the command line. Throws InputError.
+inline int count(const std::string& text) {
+  return static_cast<int>(parse_integer(text, "command line", "count", 1, 1'000'000'000));
+}
 
 /// Calls `measure(arguments)` and prints the JSON it returns. Returns the exit code: 0, or 2 with one line on stderr if
 /// the number of arguments is wrong or `measure` throws.

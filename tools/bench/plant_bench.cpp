@@ -15,7 +15,7 @@ Json measure(const std::vector<std::string>& arguments) {
   const Artifact artifact = Artifact::load(arguments[0]);
   const Scenario scenario = Scenario::load(arguments[2]);
   const Recording recording = record(artifact, Trajectory::load(arguments[1]), scenario);
-  return measure_integrators(scenario, recording.torques, artifact.sample_period_s(), std::stoi(arguments[3]));
+  return measure_integrators(scenario, recording.torques, artifact.sample_period_s(), count(arguments[3]));
 }
 
 }  // namespace

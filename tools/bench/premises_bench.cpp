@@ -134,9 +134,9 @@ StepInput input_of(std::int64_t k) {
 }
 
 Json measure(const std::vector<std::string>& arguments) {
-  const int premises = std::stoi(arguments[0]);
+  const int premises = count(arguments[0]);
   const bool dense = arguments[1] == "dense";
-  const auto steps = static_cast<std::size_t>(std::stoi(arguments[2]));
+  const auto steps = static_cast<std::size_t>(count(arguments[2]));
   const Artifact artifact = torque_law(premises, dense);
   std::vector<StepInput> inputs;
   for (std::size_t k = 0; k < steps; ++k) {
@@ -144,7 +144,7 @@ Json measure(const std::vector<std::string>& arguments) {
   }
   Controller controller(artifact);
   const Timing timing = time_calls(
-      steps, std::stoi(arguments[3]), [&] { controller.reset(); },
+      steps, count(arguments[3]), [&] { controller.reset(); },
       [&](std::size_t i) { keep(controller.step(inputs[i])); });
   controller.reset();
   for (const StepInput& input : inputs) {

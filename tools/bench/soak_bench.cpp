@@ -77,7 +77,7 @@ nlohmann::json measure(const std::vector<std::string>& arguments) {
   const Artifact artifact = Artifact::load(arguments[0]);
   const Trajectory trajectory = Trajectory::load(arguments[1]);
   const Scenario scenario = Scenario::load(arguments[2]);
-  const double wanted_s = std::stod(arguments[3]);
+  const double wanted_s = parse_number(arguments[3], "command line", "SECONDS", 1e-3, 1e6);
   Totals totals;
   run_once(artifact, trajectory, scenario, totals);
   const double early_bytes = resident_bytes();

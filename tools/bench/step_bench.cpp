@@ -20,7 +20,7 @@ Json measure(const std::vector<std::string>& arguments) {
 
   Controller controller(artifact);
   const Timing timing = time_calls(
-      recording.inputs.size(), std::stoi(arguments[3]), [&] { controller.reset(); },
+      recording.inputs.size(), count(arguments[3]), [&] { controller.reset(); },
       [&](std::size_t i) { keep(controller.step(recording.inputs[i])); });
 
   // A replay that is not the recorded run would time something else.

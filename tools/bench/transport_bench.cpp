@@ -148,7 +148,7 @@ nlohmann::json measure_authentication(std::int64_t samples) {
 }
 
 nlohmann::json measure(const std::vector<std::string>& arguments) {
-  const std::int64_t samples = std::stoll(arguments[1]);
+  const std::int64_t samples = count(arguments[1]);
   const nlohmann::json lcm = measure_lcm(arguments[0], samples);
   return {{"samples", samples},
           {"lcm", lcm},

@@ -2,7 +2,6 @@
 // docs/reference/messages.md
 #include <algorithm>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <string>
 
@@ -30,21 +29,17 @@ struct Options {
 };
 
 void declare_all(CLI::App& app, Options& options) {
-  static const std::map<std::string, SafeAction> kActions{{"zero", SafeAction::kZero},
-                                                          {"gravity", SafeAction::kGravity}};
   app.footer(
-      help_footer() +
-      "\n\nAlso: qlpv-controller --doctor (will this machine hold the rate?), qlpv-controller --reset-fault (leave a "
-      "latched fault); each has its own --help.");
+      help_footer({kExitFaultStop, kExitNoRealtime, kExitNoTransport, kExitPlantFailure}) +
+      "\n\nAlso: qlpv-controller --doctor (will this machine hold the rate?), qlpv-controller --reset-fault (leave "
+      "a latched fault); each has its own --help.");
   declare(app, options.common);
-  app.add_option("--trajectory", options.trajectory, "the reference, JSON or CBOR")->required();
-  app.add_option("--safe-action", options.loop.safe_action,
-                 "torque after a fault: zero (default), or gravity minus damping")
-      ->transform(CLI::CheckedTransformer(kActions, CLI::ignore_case).description(""));
-  app.add_option("--silence-s", options.run.silence_s, "realtime: fault after so long without a measurement")
-      ->check(CLI::PositiveNumber.description(""))
-      ->capture_default_str();
-  app.add_flag("--exit-on-fault", options.run.exit_on_fault, "end the run once a fault has led to the safe torque");
+  add_file(app, "trajectory", options.trajectory, "the reference, JSON or CBOR")->required();
+  add_word<SafeAction>(app, "safe-action", options.loop.safe_action,
+                       {{"zero", SafeAction::kZero}, {"gravity", SafeAction::kGravity}},
+                       "torque after a fault; gravity: minus damping");
+  add_time(app, "silence-s", options.run.silence_s, "realtime: fault after so long without a measurement");
+  add_switch(app, "exit-on-fault", options.run.exit_on_fault, "end the run once a fault has led to the safe torque");
 }
 
 Json describe(const ControlLoop& loop, const ControllerRunReport& run, const TelemetryReport& telemetry,
@@ -128,6 +123,10 @@ int run(const CLI::App& app, Options& options) {
   const ControllerRunReport report = run_controller(loop, robot, options.run, install_stop_signals());
   const TelemetryReport telemetry = publisher.stop();
   print_report(std::cout, describe(loop, report, telemetry, link, options.loop.realtime), common.json);
+  if (telemetry.record_drops > 0) {
+    std::cerr << "qlpv-controller: warning: " << common.record << ": " << telemetry.record_drops
+              << " rows of the record were lost\n";
+  }
   return exit_code(loop, report, link, common);
 }
 
@@ -135,22 +134,20 @@ struct DoctorOptions {
   CommonOptions common;
   double rate_hz = 1000.0;
   double seconds = 3.0;
+  bool asked = false;  ///< always, or this would be another command
 };
 
 void declare_doctor(CLI::App& app, DoctorOptions& options) {
-  app.footer("Example:\n  qlpv-controller --doctor --artifact artifact.json\n\nExit codes: 0 measured, 2 bad input.");
-  app.add_flag("--doctor", "measure whether this machine will hold the rate, and say what to change");
-  app.add_option("--artifact", options.common.artifact, "measure the step of this controller, at its rate");
-  app.add_option("--rate-hz", options.rate_hz, "the rate without an artifact")
-      ->check(CLI::Range(1.0, 1e5).description(""))
-      ->capture_default_str();
-  app.add_option("--seconds", options.seconds, "of each measurement")
-      ->check(CLI::Range(0.01, 3600.0).description(""))
-      ->capture_default_str();
+  app.footer("Example:\n  qlpv-controller --doctor --artifact artifact.json\n\n" +
+             describe_exit_codes({kExitNo, kExitNoTransport}));
+  add_switch(app, "doctor", options.asked, "measure whether this machine will hold the rate, and say what to change");
+  add_file(app, "artifact", options.common.artifact, "measure the step of this controller, at its rate");
+  add_number(app, "rate-hz", options.rate_hz, 1.0, 1e5, "the rate without an artifact");
+  add_number(app, "seconds", options.seconds, 0.01, 3600.0, "of each measurement");
   declare_transport(app, options.common);
   options.common.priority = 50;
-  declare_priority(app, options.common)->capture_default_str();
-  app.add_flag("--json", options.common.json, "report as one line of JSON");
+  declare_priority(app, options.common);
+  add_switch(app, "json", options.common.json, "report as one line of JSON");
 }
 
 /// Normal scheduling first, then what is granted: the step and the round trip under the better of both.
@@ -214,20 +211,30 @@ int run_doctor(const DoctorOptions& options) {
       std::cout << "- " << sentence << '\n';
     }
   }
-  return kExitDone;
+  switch (judge(findings)) {
+    case DoctorVerdict::kFails:
+      return kExitNo;
+    case DoctorVerdict::kNoTransport:
+      return kExitNoTransport;
+    default:
+      return kExitDone;
+  }
 }
 
-void declare_reset(CLI::App& app, CommonOptions& options) {
-  app.footer(
-      "Example:\n  qlpv-controller --reset-fault --artifact artifact.json --session 7\n\n"
-      "Exit codes: 0 out of the fault, 2 bad input, 3 still in the fault, 5 no controller of this session.");
-  app.add_flag("--reset-fault", "ask the running controller of this session to leave its latched fault");
+struct ResetOptions {
+  CommonOptions common;
+  bool asked = false;  ///< always
+};
+
+void declare_reset(CLI::App& app, ResetOptions& reset) {
+  CommonOptions& options = reset.common;
+  app.footer("Example:\n  qlpv-controller --reset-fault --artifact artifact.json --session 7\n\n" +
+             describe_exit_codes({kExitFaultStop, kExitNoTransport}));
+  add_switch(app, "reset-fault", reset.asked, "ask the running controller of this session to leave its latched fault");
   declare_identity(app, options);
   declare_transport(app, options);
   options.timeout_s = 1.0;
-  app.add_option("--timeout-s", options.timeout_s, "ask for so long")
-      ->check(CLI::PositiveNumber.description(""))
-      ->capture_default_str();
+  add_time(app, "timeout-s", options.timeout_s, "ask for so long");
 }
 
 int run_reset(const CommonOptions& options) {
@@ -257,10 +264,11 @@ int main(int argc, char** argv) {
         [&](CLI::App& app) { declare_doctor(app, options); }, [&](const CLI::App&) { return run_doctor(options); });
   }
   if (has("--reset-fault")) {
-    CommonOptions options;
+    ResetOptions options;
     return run_main(
         argc, argv, "qlpv-controller", "Asks a running controller to leave its latched fault.",
-        [&](CLI::App& app) { declare_reset(app, options); }, [&](const CLI::App&) { return run_reset(options); });
+        [&](CLI::App& app) { declare_reset(app, options); },
+        [&](const CLI::App&) { return run_reset(options.common); });
   }
   Options options;
   return run_main(

@@ -14,6 +14,7 @@
 #include <string>
 #include <string_view>
 
+#include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
 #include "quasilpv/realtime.hpp"
 
@@ -35,7 +36,7 @@ int parse_bounded(const std::string& digits, int high, const std::string& url, c
   constexpr std::size_t kMaxDigits = 5;
   const int value = digits.size() <= kMaxDigits ? std::stoi(digits) : high + 1;
   if (value > high) {
-    throw InputError("url '" + url + "'", field, digits, "at most " + std::to_string(high));
+    throw InputError("url '" + url + "'", field, quoted(digits), "at most " + std::to_string(high));
   }
   return value;
 }
@@ -68,7 +69,7 @@ MulticastAddress parse_url(const std::string& url) {
   MulticastAddress address;
   if (!is_multicast_scheme || !has_port || port.empty() || has_time_to_live == time_to_live.empty() || !rest.empty() ||
       inet_aton(group.c_str(), &address.group) == 0 || !IN_MULTICAST(ntohl(address.group.s_addr))) {
-    throw InputError("command line", "url", "'" + url + "'", kUrlForm);
+    throw InputError("command line", "url", quoted(url), kUrlForm);
   }
   address.port = parse_bounded(port, kMaxPort, url, "port");
   address.time_to_live = has_time_to_live ? parse_bounded(time_to_live, kMaxTimeToLive, url, "ttl") : 0;
@@ -100,6 +101,8 @@ void require_multicast(const MulticastAddress& address, const std::string& url) 
 }
 
 }  // namespace
+
+void check_lcm_url(const std::string& url) { static_cast<void>(parse_url(url)); }
 
 /// The LCM instance with its subscriptions; lcm.h stays out of the header.
 class LcmLink::Connection {

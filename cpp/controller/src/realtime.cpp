@@ -3,6 +3,7 @@
 #include <sched.h>
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <ctime>
@@ -37,7 +38,12 @@ extern "C" void request_stop(int /*signal*/) { g_stop_requested.store(true, std:
 }  // namespace
 
 std::int64_t to_nanoseconds(double seconds) noexcept {
-  return std::llround(seconds * static_cast<double>(kNanosecondsPerSecond));
+  constexpr double kLongestSeconds = 4e9;  // the sum of two fits
+  if (std::isnan(seconds)) {
+    return 0;
+  }
+  return std::llround(std::clamp(seconds, -kLongestSeconds, kLongestSeconds) *
+                      static_cast<double>(kNanosecondsPerSecond));
 }
 
 std::int64_t monotonic_ns() noexcept {

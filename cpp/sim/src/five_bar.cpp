@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "format_number.hpp"
+#include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {

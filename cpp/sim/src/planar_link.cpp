@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "format_number.hpp"
+#include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {

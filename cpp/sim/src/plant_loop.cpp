@@ -5,7 +5,7 @@
 #include <iterator>
 #include <optional>
 
-#include "format_number.hpp"
+#include "quasilpv/decimal.hpp"
 #include "quasilpv/realtime.hpp"
 #include "quasilpv/run_columns.hpp"
 #include "quasilpv/watchdog.hpp"
@@ -16,7 +16,7 @@ namespace {
 constexpr std::int64_t kRepeatPeriodNs = 50 * kNanosecondsPerMillisecond;
 constexpr std::int64_t kLongestWaitNs = 10 * kNanosecondsPerMillisecond;
 constexpr double kNoCommand = -1.0;
-constexpr double kLargestTorqueNm = 1e12;  // that a scenario may hold
+constexpr double kLargestTorqueNm = 1e12;  // without a limit of the artifact
 
 JointArray to_array(const double (&source)[kMaxJoints]) {
   JointArray target;

@@ -4,6 +4,12 @@
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {
+namespace {
+
+constexpr std::size_t kMostSamples = 10'000'000;  // a few gigabytes
+
+}  // namespace
+
 std::size_t Record::add_column(const std::string& name, std::size_t width) {
   for (const Column& column : columns_) {
     if (column.name == name) {
@@ -18,6 +24,10 @@ std::size_t Record::add_column(const std::string& name, std::size_t width) {
 }
 
 void Record::reserve(std::size_t samples) {
+  if (samples > kMostSamples) {
+    throw InputError("record", "samples", std::to_string(samples),
+                     "at most " + std::to_string(kMostSamples) + ": a shorter run, or none that is recorded");
+  }
   for (Column& column : columns_) {
     column.values.reserve(samples * column.width);
   }

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "format_number.hpp"
+#include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {

@@ -4,14 +4,19 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <iostream>
-#include <map>
+#include <limits>
+#include <new>
 #include <string>
 
 #include "quasilpv/artifact.hpp"
 #include "quasilpv/errors.hpp"
+#include "quasilpv/exit_codes.hpp"
 #include "quasilpv/lcm_link.hpp"
+#include "quasilpv/options.hpp"
 #include "quasilpv/pacer.hpp"
+#include "quasilpv/process_setup.hpp"
 #include "quasilpv/realtime.hpp"
 #include "quasilpv/run_report.hpp"
 
@@ -34,47 +39,54 @@ struct CommonOptions {
 };
 
 /// The end of the help: one run as two commands, and the exit codes.
-inline std::string help_footer(const std::string& more_exit_codes = "") {
+inline std::string help_footer(std::initializer_list<ExitCode> exit_codes) {
   return "Example:\n"
          "  qlpv-controller --artifact artifact.json --trajectory trajectory.json --session 7 --record controller.csv "
          "&\n"
-         "  qlpv-simulator --artifact artifact.json --scenario scenario.json --session 7 --record plant.csv\n\n"
-         "Exit codes: 0 done, 2 bad input, 3 fault stop, 4 no real-time privilege, 5 no transport" +
-         more_exit_codes + ".";
+         "  qlpv-simulator --artifact artifact.json --scenario scenario.json --session 7 --record plant.csv\n\n" +
+         describe_exit_codes(exit_codes);
+}
+
+/// Bounds of every time on a command line: shorter ones are no time for a process, longer ones no run.
+inline constexpr double kShortestTimeS = 1e-4;
+inline constexpr double kLongestTimeS = 86400.0;
+
+inline CLI::Option* add_time(CLI::App& app, const std::string& name, double& value, const std::string& meaning) {
+  return add_number(app, name, value, kShortestTimeS, kLongestTimeS, meaning);
 }
 
 inline void declare_identity(CLI::App& app, CommonOptions& options) {
-  app.add_option("--artifact", options.artifact, "the controller, JSON or CBOR")->required();
-  app.add_option("--session", options.session, "a number of your choice, the same on both sides")->required();
-  app.add_option("--key", options.key,
-                 "sign messages, and accept signed ones only: a file of mode 0600 with the secret");
+  add_file(app, "artifact", options.artifact, "the controller, JSON or CBOR")->required();
+  add_integer(app, "session", options.session, 0, std::numeric_limits<std::int64_t>::max(),
+              "of your choice, the same on both sides")
+      ->required();
+  add_file(app, "key", options.key, "sign messages, and accept signed ones only: of mode 0600, with the secret");
 }
 
 inline void declare_transport(CLI::App& app, CommonOptions& options) {
-  app.add_option("--url", options.url, "LCM address")->capture_default_str();
-  app.add_flag("--allow-network", options.allow_network,
-               "accept a url with ttl > 0; without --key messages are not authenticated");
+  add_typed(app, "url", "URL", "LCM address (default " + options.url + ")", [&options](const std::string& text) {
+    check_lcm_url(text);
+    options.url = text;
+  });
+  add_switch(app, "allow-network", options.allow_network,
+             "accept a url with ttl > 0; without --key messages are not authenticated");
 }
 
 inline CLI::Option* declare_priority(CLI::App& app, CommonOptions& options) {
-  app.add_option("--cpu", options.cpu, "stay on this core, 0, 1, ...")->check(CLI::NonNegativeNumber.description(""));
-  return app.add_option("--priority", options.priority, "lock memory and use SCHED_FIFO with this priority, 1..99")
-      ->check(CLI::Range(1, 99).description(""));
+  add_integer(app, "cpu", options.cpu, 0, kMostCpus - 1, "stay on this core");
+  return add_integer(app, "priority", options.priority, 1, 99, "lock memory and use SCHED_FIFO with this priority");
 }
 
 inline void declare(CLI::App& app, CommonOptions& options) {
-  static const std::map<std::string, Pace> kPaces{{"lockstep", Pace::kLockStep}, {"realtime", Pace::kRealTime}};
   declare_identity(app, options);
   declare_transport(app, options);
-  app.add_option("--record", options.record, "write every sample to this CSV file");
-  app.add_option("--mode", options.pace, "lockstep (default) or realtime")
-      ->transform(CLI::CheckedTransformer(kPaces, CLI::ignore_case).description(""));
-  app.add_flag("--require-rt", options.require_realtime, "exit 4 if --priority cannot be had")
+  add_file(app, "record", options.record, "write every sample to this CSV file");
+  add_word<Pace>(app, "mode", options.pace, {{"lockstep", Pace::kLockStep}, {"realtime", Pace::kRealTime}},
+                 "who makes time pass");
+  add_switch(app, "require-rt", options.require_realtime, "exit 4 if --priority cannot be had")
       ->needs(declare_priority(app, options));
-  app.add_option("--timeout-s", options.timeout_s, "end the run after so long without the other side")
-      ->check(CLI::PositiveNumber.description(""))
-      ->capture_default_str();
-  app.add_flag("--json", options.json, "report as one line of JSON");
+  add_time(app, "timeout-s", options.timeout_s, "end the run after so long without the other side");
+  add_switch(app, "json", options.json, "report as one line of JSON");
 }
 
 /// How this side signs its messages.
@@ -121,7 +133,7 @@ inline void warn_of_other_run(const std::string& program, const Link& link, cons
                                            const std::string& other_side) {
   const std::string hint = other_run_hint(link, options.url);
   throw TransportError("no " + message + " of session " + std::to_string(options.session) + " on " + options.url +
-                       " within " + std::to_string(options.timeout_s) + " s: is " + other_side + " running?" +
+                       " within " + format_number(options.timeout_s) + " s: is " + other_side + " running?" +
                        (hint.empty() ? "" : " (" + hint + ")"));
 }
 
@@ -185,25 +197,27 @@ inline bool apply_priority(const CLI::App& app, const CommonOptions& options) {
   return false;
 }
 
-/// Declares the options, parses the command line and runs `body`; every error becomes one line on stderr and its exit
-/// code. Never throws.
+/// Prepares the process, declares the options, parses the command line and runs `body`; every error becomes one line on
+/// stderr and its exit code, and so does a report that got lost. Never throws.
 inline int run_main(int argc, char** argv, const std::string& name, const std::string& description,
                     const std::function<void(CLI::App&)>& declare_options,
                     const std::function<int(const CLI::App&)>& body) noexcept {
   const auto fail = [&name](const char* what, ExitCode code) {
-    std::cerr << name << ": " << what << '\n';
-    return static_cast<int>(code);
+    std::cerr << name << ": " << on_one_line(what) << '\n';
+    return finish_output(name, code);
   };
   try {
+    prepare_process();
     CLI::App app(description, name);
     declare_options(app);
+    refuse_empty_switch(app, argc, argv);
     try {
       app.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {
       std::cout << app.help();
-      return kExitDone;
+      return finish_output(name, kExitDone);
     }
-    return body(app);
+    return finish_output(name, body(app));
   } catch (const CLI::ParseError& error) {
     return fail(error.what(), kExitBadInput);
   } catch (const InputError& error) {
@@ -214,6 +228,8 @@ inline int run_main(int argc, char** argv, const std::string& name, const std::s
     return fail(error.what(), kExitNoTransport);
   } catch (const PlantError& error) {
     return fail(error.what(), kExitPlantFailure);
+  } catch (const std::bad_alloc&) {
+    return fail("no memory", kExitInternal);
   } catch (const std::exception& error) {
     return fail(error.what(), kExitInternal);
   }

@@ -11,6 +11,9 @@ namespace quasilpv {
 /// This machine only: a packet with a time to live of 0 never leaves it.
 inline constexpr const char* kDefaultLcmUrl = "udpm://239.255.76.67:7667?ttl=0";
 
+/// Throws InputError if `url` is not of the form `udpm://ADDRESS:PORT?ttl=N`. INIT-ONLY.
+void check_lcm_url(const std::string& url);
+
 /// Which channels an LcmLink listens to.
 enum class Listen { kPeer, kNothing };
 

@@ -8,8 +8,9 @@ namespace quasilpv {
 
 inline constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 inline constexpr std::int64_t kNanosecondsPerMillisecond = 1'000'000;
+inline constexpr int kMostCpus = 1024;  ///< cores a machine may have: CPU_SETSIZE
 
-/// Seconds as whole nanoseconds, rounded to nearest. RT-SAFE.
+/// Seconds as whole nanoseconds, rounded to nearest; at most 127 years either way, and 0 for NaN. RT-SAFE.
 std::int64_t to_nanoseconds(double seconds) noexcept;
 
 /// CLOCK_MONOTONIC, ns: steps of the wall clock have no effect on it, and all processes of a machine share it. RT-SAFE.

@@ -4,23 +4,13 @@
 #include <ostream>
 
 #include "quasilpv/document.hpp"
+#include "quasilpv/exit_codes.hpp"
 #include "quasilpv/failsafe.hpp"
 #include "quasilpv/latency_histogram.hpp"
 #include "quasilpv/link.hpp"
 #include "quasilpv/post_mortem.hpp"
 
 namespace quasilpv {
-
-/// Exit codes of both executables.
-enum ExitCode : int {
-  kExitDone = 0,
-  kExitInternal = 1,  ///< anything not foreseen below, for example no memory
-  kExitBadInput = 2,
-  kExitFaultStop = 3,
-  kExitNoRealtime = 4,
-  kExitNoTransport = 5,
-  kExitPlantFailure = 6
-};
 
 /// `{count, p50, p99, p99_9, max}` in ns; null where there is nothing to say. RT-UNSAFE, as all here.
 Json to_json(const LatencyHistogram& histogram);

@@ -15,6 +15,7 @@ import typer
 from quasilpv import __version__
 from quasilpv.cli.console import print_json
 from quasilpv.cli.environment import settle
+from quasilpv.cli.stack import require_stack
 from quasilpv.cli.stopping import Stopped, raise_when_stopped
 from quasilpv.cli.streams import ReaderLeftError, answered, guarded_streams, open_missing_streams
 from quasilpv.cli.usage import usage_error
@@ -124,6 +125,7 @@ def run(arguments: Sequence[str]) -> int:
 def _run(arguments: Sequence[str]) -> int:
     """Run the command on guarded streams."""
     try:
+        require_stack()
         code = app(args=list(arguments), prog_name="design", standalone_mode=False)
         if code == EXIT_INTERRUPTED:
             raise KeyboardInterrupt  # typer has swallowed it
