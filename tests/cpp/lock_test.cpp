@@ -89,7 +89,7 @@ TEST_F(Lock, is_counted_for_mutexes_conditions_semaphores_and_spin_locks) {
   std::mutex mutex;
   EXPECT_EQ(calls_in([&] { const std::lock_guard<std::mutex> lock(mutex); }), 1);
   std::timed_mutex timed;
-  EXPECT_EQ(calls_in([&] { timed.try_lock(); }), 1);
+  EXPECT_EQ(calls_in([&] { EXPECT_TRUE(timed.try_lock()); }), 1);
   std::shared_mutex shared;
   EXPECT_EQ(calls_in([&] { const std::shared_lock<std::shared_mutex> lock(shared); }), 1);
   EXPECT_EQ(calls_in([&] { const std::unique_lock<std::shared_mutex> lock(shared); }), 1);
