@@ -47,7 +47,7 @@ def pair_of_results(name: str, error_rad: float = 1e-4) -> list[TrackResult]:
         return replace(
             plain,
             run=record,
-            metrics=compute_metrics(record, tool),
+            metrics=compute_metrics(record, tool(record.true_angle_rad) - tool(reference)),
             tool_position_m=tool(record.true_angle_rad),
             reference_position_m=tool(reference),
         )

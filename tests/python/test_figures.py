@@ -25,7 +25,7 @@ from quasilpv.figures import (
     velocity_figure,
 )
 from quasilpv.figures.gallery import write_comparison, write_gallery
-from quasilpv.figures.style import CONTROLLER_COLOURS, JOINT_COLOURS
+from quasilpv.figures.style import CONTROLLER_COLOURS, FORMATS, JOINT_COLOURS, PIXELS_PER_INCH, style
 from reference.readable import assert_readable
 from reference.runs import synthetic_result
 
@@ -87,30 +87,43 @@ def test_when_a_law_estimates_no_disturbance_expect_no_figure_of_it(tmp_path: Pa
     assert not [file for file in write_gallery(result, tmp_path) if file.stem == "disturbance"]
 
 
-def test_when_a_gallery_is_written_expect_a_png_for_print_and_an_svg_of_each(tmp_path: Path) -> None:
+def test_when_a_gallery_is_written_expect_a_png_for_print_of_each_and_no_more(tmp_path: Path) -> None:
     files = [*write_gallery(default_result(), tmp_path), *write_comparison(all_results(), tmp_path)]
     assert {file.name for file in files} == {
-        f"{name}{suffix}"
-        for name in ("path", "errors", "torques", "velocity", "disturbance", "comparison")
-        for suffix in (".png", ".svg")
+        f"{name}.png" for name in ("path", "errors", "torques", "velocity", "disturbance", "comparison")
     }
     for file in files:
-        if file.suffix == ".png":
-            with Image.open(file) as image:
-                assert image.width >= 1200
-                assert len(image.convert("L").getcolors(1 << 16) or []) > 2  # not blank
-        else:
-            assert "time (s)" in file.read_text(encoding="utf-8") or "X (m)" in file.read_text(encoding="utf-8")
+        with Image.open(file) as image:
+            assert image.width >= 1200
+            assert len(image.convert("L").getcolors(1 << 16) or []) > 2  # not blank
     assert set(tmp_path.iterdir()) == set(files)
 
 
+def test_when_other_formats_are_asked_for_expect_each_once_and_what_is_none_refused(tmp_path: Path) -> None:
+    files = save(error_figure(default_result()), tmp_path / "errors", ("svg", "pdf", "svg"))
+    assert [file.name for file in files] == ["errors.svg", "errors.pdf"]
+    assert "time (s)" in files[0].read_text(encoding="utf-8")
+    assert files[1].read_bytes().startswith(b"%PDF")
+    with pytest.raises(InputError, match="format: got jpeg, expected one of png, svg, pdf"):
+        save(error_figure(default_result()), tmp_path / "errors", ("png", "jpeg"))
+    assert set(tmp_path.iterdir()) == set(files)
+
+
+def test_laid_out_once_a_figure_is_what_matplotlib_makes_of_it_laid_out_for_the_file(tmp_path: Path) -> None:
+    for draw in (error_figure, path_figure):
+        (file,) = save(draw(default_result()), tmp_path / "once")
+        with style():
+            draw(default_result()).savefig(tmp_path / "twice.png", dpi=PIXELS_PER_INCH)
+        with Image.open(file) as once, Image.open(tmp_path / "twice.png") as twice:
+            np.testing.assert_array_equal(np.asarray(once), np.asarray(twice))
+
+
 def test_when_the_same_figure_is_written_twice_expect_the_same_bytes(tmp_path: Path) -> None:
-    for name in ("first", "second"):
-        save(path_figure(default_result()), tmp_path / name / "path")
-    for suffix in (".png", ".svg"):
-        assert (tmp_path / "first" / f"path{suffix}").read_bytes() == (
-            tmp_path / "second" / f"path{suffix}"
-        ).read_bytes()
+    first, second = (
+        save(path_figure(default_result()), tmp_path / name / "path", tuple(FORMATS)) for name in ("first", "second")
+    )
+    assert [file.suffix for file in first] == [".png", ".svg", ".pdf"]
+    assert [file.read_bytes() for file in first] == [file.read_bytes() for file in second]
 
 
 def test_when_the_folder_cannot_be_written_expect_one_line(tmp_path: Path) -> None:

@@ -267,7 +267,7 @@ def test_when_the_command_checks_a_design_expect_exit_0_its_json_and_a_figure(
     path = write_artifact(tmp_path, Artifact.from_document(kept()))[0]
     assert run(["robust", str(path), "--json", "-o", str(tmp_path)]) == 0
     assert json.loads(capsys.readouterr().out) == verdict().to_document()
-    assert {file.name for file in tmp_path.glob("growth-rate.*")} == {"growth-rate.png", "growth-rate.svg"}
+    assert {file.name for file in tmp_path.glob("growth-rate.*")} == {"growth-rate.png"}
     assert run(["robust", str(path)]) == 0
     assert "a grid check, not a proof" in capsys.readouterr().out
 

@@ -125,10 +125,11 @@ def test_metrics_count_the_samples_at_a_limit_and_take_the_largest_excess() -> N
     run = synthetic_run(samples=8, joints=2)
     flags = np.array([0, 1 << 2, 1 << 3, (1 << 2) | (1 << 3), 1 << 1, 1, 0, 0])
     excess = np.array([0.0, 0.1, 0.02, 0.0, 0.3, 0.0, 0.0, 0.0])
-    metrics = compute_metrics(replace(run, flags=flags, premise_excess=excess), tool_position)
+    error = tool_position(run.true_angle_rad) - tool_position(run.reference_angle_rad)
+    metrics = compute_metrics(replace(run, flags=flags, premise_excess=excess), error)
     assert metrics.share_at_limit == 3 / 8
     assert metrics.largest_premise_excess == 0.3
-    healthy = compute_metrics(run, tool_position)
+    healthy = compute_metrics(run, error)
     assert (healthy.share_at_limit, healthy.largest_premise_excess) == (0.0, 0.0)
 
 

@@ -462,7 +462,7 @@ def test_when_figures_are_drawn_from_a_log_expect_those_of_the_run(
 ) -> None:
     assert run(["log", "plot", str(tracked[1]), "-o", str(tmp_path), "--json"]) == 0
     files = json.loads(capsys.readouterr().out)["figures"]
-    assert {"path.png", "errors.svg", "disturbance.png"} <= {Path(file).name for file in files}
+    assert {"path.png", "errors.png", "disturbance.png"} <= {Path(file).name for file in files}
     assert all(Path(file).stat().st_size > 1000 for file in files)
 
 

@@ -278,7 +278,6 @@ def test_one_item_from_the_command_line_end_to_end(tmp_path: Path, capsys: pytes
     assert all(check["holds"] for check in row["checks"])
     assert {path.name for path in tmp_path.iterdir()} >= {
         "fig-II.1.png",
-        "fig-II.1.svg",
         "fig-II.1.json",
         "results.json",
     }

@@ -394,7 +394,7 @@ class TestCommands:
         done = self.design("region", "ex-I.1", "-c", "II.6", *axes, "-j", "1", "-o", str(tmp_path), "--json")
         document = json.loads(done.stdout)
         assert {"points", "boundary", "seconds_per_point", "proved_share", "areas"} <= set(document)
-        assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png", ".svg", ".jsonl"}
+        assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png", ".jsonl"}
         assert len(document["points"]) == 9
 
     def test_maps_of_different_questions_lie_beside_each_other(self, tmp_path: Path) -> None:

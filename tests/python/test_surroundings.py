@@ -62,7 +62,7 @@ def assert_drawn(done: subprocess.CompletedProcess[str], folder: Path) -> None:
     assert (done.returncode, done.stdout) == (0, "")
     assert done.stderr.startswith("wrote path.png, ")
     assert done.stderr.count("\n") == 1
-    assert (folder / "r" / "path.svg").stat().st_size > 1000
+    assert (folder / "r" / "path.png").stat().st_size > 1000
 
 
 def test_when_everything_around_is_odd_at_once_expect_the_figures_all_the_same(log: Path, tmp_path: Path) -> None:

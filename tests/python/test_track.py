@@ -63,9 +63,6 @@ def results(cache: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[tuple
 
 
 def test_when_the_errors_are_known_expect_the_metrics_of_their_definitions() -> None:
-    def flat(angle: FloatArray) -> FloatArray:  # a tool whose position is the first two joint angles
-        return angle[:, :2]
-
     run = synthetic_run(samples=4, joints=3)
     error = np.array([[3e-3, 0.0, 9.0], [-4e-3, 0.0, 9.0], [0.0, 1e-3, 9.0], [0.0, -1e-3, 9.0]])
     torque = np.array([[1.0, 2.0, 2.0], [1.0, 2.0, 2.0], [4.0, 6.0, 2.0], [4.0, 6.0, 2.0]])
@@ -77,7 +74,7 @@ def test_when_the_errors_are_known_expect_the_metrics_of_their_definitions() -> 
             torque_nm=torque,
             estimated_speed_rad_s=run.true_speed_rad_s + speed_error,
         ),
-        flat,
+        error[:, :2],  # of a tool whose position is the first two joint angles
     )
     assert metrics.rms_x_m == pytest.approx(2.5e-3, rel=1e-9)  # sqrt((9 + 16) / 4)
     assert metrics.rms_y_m == pytest.approx(np.sqrt(0.5) * 1e-3, rel=1e-9)

@@ -49,7 +49,7 @@ def synthetic_result(variant: Variant, joints: int = 3, samples: int = 2000) -> 
         rate_hz=1000.0,
         plant="perturbed",
         velocity_noise_rad_s=0.05,
-        metrics=compute_metrics(run, tool_position),
+        metrics=compute_metrics(run, tool_position(run.true_angle_rad) - tool_position(run.reference_angle_rad)),
         worst_growth_rate_per_s=None,
         run=run,
         tool_position_m=tool_position(run.true_angle_rad),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -52,22 +51,15 @@ def rms_over_samples(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.sum(np.square(values), axis=1))))
 
 
-def tool_error(run: Run, tool_position: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Position error of the tool, FK(true angle) - FK(reference angle).
+def compute_metrics(run: Run, tool_error_m: FloatArray) -> Metrics:
+    """All metrics of one run.
 
     Args:
         run: the record.
-        tool_position: forward kinematics, (N, n) rad -> (N, 2) m in the base frame (X to the right, Y up).
-
-    Returns:
-        (N, 2) m. True angles, not measured ones: the encoder's rounding is not excused.
+        tool_error_m: (N, 2) m, position error of the tool, FK(true angle) - FK(reference angle), in the base frame (X to
+            the right, Y up). True angles, not measured ones: the encoder's rounding is not excused.
     """
-    return tool_position(run.true_angle_rad) - tool_position(run.reference_angle_rad)
-
-
-def compute_metrics(run: Run, tool_position: Callable[[FloatArray], FloatArray]) -> Metrics:
-    """All metrics of one run; ``tool_position`` as in `tool_error`."""
-    error = tool_error(run, tool_position)
+    error = tool_error_m
     rms_x, rms_y = np.sqrt(np.mean(np.square(error), axis=0))
     mav_x, mav_y = np.max(np.abs(error), axis=0)
     return Metrics(

@@ -294,6 +294,7 @@ def summarise_as(
     def tool_position(angle: FloatArray) -> FloatArray:
         return np.array([mechanism.forward_kinematics(row)[:2] for row in angle])
 
+    actual, wanted = tool_position(run.true_angle_rad), tool_position(run.reference_angle_rad)
     runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()), artifact.name)
     return TrackResult(
         scenario=name,
@@ -301,11 +302,11 @@ def summarise_as(
         rate_hz=round(1.0 / artifact.sample_period_s, 6),
         plant=plant,
         velocity_noise_rad_s=sensors.velocity_noise_rad_s,
-        metrics=compute_metrics(run, tool_position),
+        metrics=compute_metrics(run, actual - wanted),
         worst_growth_rate_per_s=worst_growth_rate(artifact),
         run=run,
-        tool_position_m=tool_position(run.true_angle_rad),
-        reference_position_m=tool_position(run.reference_angle_rad),
+        tool_position_m=actual,
+        reference_position_m=wanted,
         true_disturbance=true_disturbance(run, artifact, runtime),
         envelope=OperatingEnvelope.of(artifact),
     )

@@ -1,4 +1,4 @@
-"""Figures of closed-loop runs: one style, PNG and SVG, readable in print and for colour-blind readers."""
+"""Figures of closed-loop runs: one style, readable in print and for colour-blind readers."""
 
 from quasilpv.figures.comparison import comparison_figure
 from quasilpv.figures.style import save

@@ -8,7 +8,7 @@ from pathlib import Path
 from quasilpv.experiments.result import TrackResult
 from quasilpv.figures.comparison import comparison_figure
 from quasilpv.figures.envelope import envelope_figure
-from quasilpv.figures.style import save
+from quasilpv.figures.style import DEFAULT_FORMATS, save
 from quasilpv.figures.tracking import (
     disturbance_figure,
     error_figure,
@@ -18,11 +18,11 @@ from quasilpv.figures.tracking import (
 )
 
 
-def write_gallery(result: TrackResult, folder: Path) -> list[Path]:
+def write_gallery(result: TrackResult, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> list[Path]:
     """Write path, errors, torques, speed error and, if the law has them, disturbance and operating envelope of a run.
 
     Returns:
-        The files, PNG and SVG of each.
+        The files, one per figure and format.
 
     Raises:
         InputError: the folder cannot be written.
@@ -37,13 +37,15 @@ def write_gallery(result: TrackResult, folder: Path) -> list[Path]:
         figures["disturbance"] = disturbance_figure
     if result.envelope is not None:
         figures["envelope"] = envelope_figure
-    return [file for name, draw in figures.items() for file in save(draw(result), folder / name)]
+    return [file for name, draw in figures.items() for file in save(draw(result), folder / name, formats)]
 
 
-def write_comparison(results: Sequence[TrackResult], folder: Path) -> list[Path]:
+def write_comparison(
+    results: Sequence[TrackResult], folder: Path, formats: Sequence[str] = DEFAULT_FORMATS
+) -> list[Path]:
     """Write the comparison of all runs of one scenario.
 
     Raises:
         InputError: the folder cannot be written.
     """
-    return save(comparison_figure(results), folder / "comparison")
+    return save(comparison_figure(results), folder / "comparison", formats)

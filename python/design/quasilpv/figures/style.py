@@ -7,7 +7,7 @@ is touched: figures are built from `Figure` with the Agg canvas, which also make
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from quasilpv.errors import InputError, one_of
 from quasilpv.files import write_atomically
 
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
@@ -48,6 +49,10 @@ REFERENCE_COLOUR = "#8c8c8c"
 
 WIDTH_IN = 7.0
 PIXELS_PER_INCH = 200
+
+FORMATS: Mapping[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+"""Formats of files, and what of their metadata is left out, so that equal figures are equal files."""
+DEFAULT_FORMATS = ("png",)
 
 _PARAMETERS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -86,7 +91,7 @@ def style() -> Iterator[None]:
 
 def new_figure(height_in: float, title: str) -> Figure:
     """An empty figure of the common width with a title, laid out so that no text overlaps."""
-    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, height_in), dpi=PIXELS_PER_INCH, layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(title, fontsize=10.5, x=0.01, ha="left")
     return figure
@@ -115,24 +120,50 @@ def length_unit(largest_m: float) -> Unit:
     return Unit("µm", 1e6) if largest_m < 2e-4 else Unit("mm", 1e3)
 
 
-def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write ``stem.png`` and ``stem.svg``, each complete or not at all.
+def save(figure: Figure, stem: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> list[Path]:
+    """Write ``stem.png``, or the figure in other formats, each file complete or not at all.
 
     Args:
-        figure: a figure of this package.
+        figure: a figure of this package; it is laid out, and keeps this layout.
         stem: path without suffix; missing folders are made.
+        formats: of `FORMATS`.
 
     Returns:
-        The two paths.
+        The paths, one per format.
 
     Raises:
-        InputError: the folder or a file cannot be written.
+        InputError: a format is none of `FORMATS`, or the folder or a file cannot be written.
     """
-    images: dict[Path, bytes] = {}
-    for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None})):
-        image = io.BytesIO()
-        with style():
-            figure.savefig(image, format=suffix[1:], dpi=PIXELS_PER_INCH, metadata=metadata)
-        images[stem.with_name(stem.name + suffix)] = image.getvalue()
+    images = {stem.with_name(f"{stem.name}.{name}"): image(figure, name) for name in require_formats(formats)}
     write_atomically(images)
     return list(images)
+
+
+def image(figure: Figure, name: str = "png") -> bytes:
+    """A figure of this package as a file of one format, the same bytes for the same figure.
+
+    Args:
+        figure: it is laid out, and keeps this layout: matplotlib would lay it out for every format again, and draw all
+            of it once more to do so.
+        name: of `FORMATS`.
+    """
+    data = io.BytesIO()
+    with style():
+        layout = figure.get_layout_engine()
+        if layout is not None:
+            layout.execute(figure)
+            figure.set_layout_engine("none")
+        figure.savefig(data, format=name, dpi=PIXELS_PER_INCH, metadata=FORMATS[name])
+    return data.getvalue()
+
+
+def require_formats(names: Sequence[str]) -> tuple[str, ...]:
+    """Formats by name, each once.
+
+    Raises:
+        InputError: one is none of `FORMATS`.
+    """
+    for name in names:
+        if name not in FORMATS:
+            raise InputError("figures", "format", name, one_of(FORMATS, name))
+    return tuple(dict.fromkeys(names))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from quasilpv.errors import InputError
-from quasilpv.figures.style import save
+from quasilpv.figures.style import DEFAULT_FORMATS, save
 from quasilpv.files import write_atomically, write_readable_json
 from quasilpv.reproduction.item import Effort, Item, ItemResult
 from quasilpv.reproduction.report import markdown_table
@@ -23,18 +23,20 @@ def reproduce(
     effort: Effort,
     out: Path,
     *,
+    formats: Sequence[str] = DEFAULT_FORMATS,
     begin: Callable[[str], None] = lambda _: None,
     end: Callable[[], None] = lambda: None,
 ) -> list[Mapping[str, Any]]:
     """Compute items and write figures, ``<id>.json`` each, and all current rows as ``results.json``, ``results.md``.
 
-    An item whose result is already in the folder, computed with the same effort from the same code, is not computed
+    An item whose result is already in the folder, computed with the same effort from the same code and drawn in these formats, is not computed
     again: an interrupted run goes on where it stopped.
 
     Args:
         items: which.
         effort: how fine.
         out: folder; made if it is missing.
+        formats: of the figures, see `quasilpv.figures.style.FORMATS`.
         begin, end: called around every item.
 
     Returns:
@@ -48,9 +50,9 @@ def reproduce(
     _write_results(out, rows, code)  # a folder that cannot be written is found before anything is computed
     for one in items:
         begin(one.id)
-        row = _kept(out / f"{one.id}.json", effort, code)
+        row = _kept(out / f"{one.id}.json", effort, code, formats)
         if row is None:
-            row = {**_computed(one, effort, out), "effort": effort.value, "code": code}
+            row = {**_computed(one, effort, out, formats), "effort": effort.value, "code": code, "formats": [*formats]}
             write_readable_json(out / f"{one.id}.json", row)
         rows.append(row)
         _write_results(out, rows, code)
@@ -58,12 +60,12 @@ def reproduce(
     return rows
 
 
-def _computed(one: Item, effort: Effort, out: Path) -> dict[str, Any]:
+def _computed(one: Item, effort: Effort, out: Path, formats: Sequence[str]) -> dict[str, Any]:
     start = time.perf_counter()
     finding = one.compute(effort)
     result = ItemResult(one, finding, time.perf_counter() - start)
     for name, figure in finding.figures.items():
-        save(figure, out / (f"{one.id}-{name}" if name else one.id))
+        save(figure, out / (f"{one.id}-{name}" if name else one.id), formats)
     return result.to_document()
 
 
@@ -75,10 +77,12 @@ def _write_results(out: Path, rows: Sequence[Mapping[str, Any]], code: str) -> N
     write_atomically({out / REPORT: markdown_table(merged).encode()})
 
 
-def _kept(path: Path, effort: Effort, code: str) -> Mapping[str, Any] | None:
-    """The row of an earlier run, if it is of the same effort and code."""
+def _kept(path: Path, effort: Effort, code: str, formats: Sequence[str]) -> Mapping[str, Any] | None:
+    """The row of an earlier run, if it is of the same effort and code, and drew these formats."""
     rows = _rows(path)
-    return rows[0] if rows and (rows[0]["effort"], rows[0]["code"]) == (effort.value, code) else None
+    if not rows or (rows[0]["effort"], rows[0]["code"]) != (effort.value, code):
+        return None
+    return rows[0] if {*formats} <= {*rows[0].get("formats", ())} else None
 
 
 def _rows(path: Path) -> list[Mapping[str, Any]]:
