@@ -29,6 +29,7 @@ LAYERS = (
     {"telemetry"},
     {"experiments"},
     {"figures"},
+    {"chain"},
     {"view"},
     {"reproduction"},
     {"cli"},

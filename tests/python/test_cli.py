@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quasilpv.artifact import Artifact, read_artifact
+from quasilpv.artifact import Artifact, read_artifact, write_artifact
 from quasilpv.artifact.canonical import canonical_json, parse_document, with_hash
 from quasilpv.cli import run
 from quasilpv.cli.verbs import VERBS
 from quasilpv.errors import ClaimError, FaultStop, InfeasibleError, PlantError, QuasilpvError
 from quasilpv.experiments.result import Variant
+from quasilpv.release import release
 from quasilpv.telemetry import read_log
 
 HEAVY = ("sympy", "matplotlib", "scipy", "clarabel", "cvxpy", "joblib")
@@ -176,7 +177,12 @@ def test_when_a_specification_is_infeasible_expect_exit_1_and_no_file(design: De
         (["track", "serial-square", "--encoder-bits", "64"], ["64"]),
         (["track", "serial-square", "--no-compensation", "--controller", "pid"], ["pid"]),
         (["track", "serial-square", "--artifact", "missing.json"], ["missing.json"]),
-        (["track", "--trajectory", "missing.json"], ["missing.json"]),
+        (["track", "--trajectory", "missing.json", "--robot", "arm3"], ["missing.json"]),
+        (["track", "--trajectory", "missing.json"], ["--robot", "--artifact"]),
+        (["track", "--trajectory", "missing.json", "--robot", "arm9"], ["arm9", "arm3"]),
+        (["track", "serial-square", "--robot", "arm3"], ["--robot", "--trajectory"]),
+        (["track", "serial-square", "--figure-format", "jpeg"], ["jpeg", "png, svg, pdf"]),
+        (["log", "info", "LAST", "--figure-format", "svg"], ["--figure-format", "plot"]),
         (["track", "serial-square", "--artifact", "x.json", "--rate-hz", "2000"], ["--rate-hz", "--artifact"]),
         (["hil", "serial-star"], ["serial-star"]),
         (["hil"], ["SCENARIO"]),
@@ -310,14 +316,15 @@ def test_when_an_artifact_and_figures_are_asked_for_expect_one_row_and_the_figur
     assert "pid" in outcome.out
     assert "error" not in outcome.err
     names = {path.name for path in (tmp_path / "here").rglob("*.png")}
-    assert names == {"path.png", "errors.png", "torques.png", "velocity.png", "comparison.png"}
+    assert names == {"path.png", "errors.png", "torques.png", "velocity.png"}
 
 
 def test_when_a_path_file_is_followed_expect_its_name_in_the_row(design: Design, tmp_path: Path) -> None:
     line = {"line": {"to": [1.5, -1.7], "duration_s": 1.0}}
     path = {"name": "short", "tool_angle_rad": 0.785, "start": [1.4, -1.7], "segments": [line]}
     (tmp_path / "short.json").write_text(json.dumps(path), encoding="utf-8")
-    rows = json.loads(design("track", "--trajectory", "short.json", "--controller", "ctc", "--json").out)
+    command = ("track", "--trajectory", "short.json", "--robot", "arm3", "--controller", "ctc", "--json")
+    rows = json.loads(design(*command).out)
     assert [row["scenario"] for row in rows] == ["short"]
 
 
@@ -330,7 +337,22 @@ def test_when_a_path_leaves_reach_or_modelling_box_expect_one_line_with_the_reas
     segment = {"line": {"to": to, "duration_s": 1.0}}
     path = {"name": "short", "tool_angle_rad": 0.785, "start": [1.4, -1.7], "segments": [segment]}
     (tmp_path / "short.json").write_text(json.dumps(path), encoding="utf-8")
-    assert_refused(design("track", "--trajectory", "short.json", "--controller", "ctc"), mention)
+    command = ("track", "--trajectory", "short.json", "--robot", "arm3", "--controller", "ctc")
+    assert_refused(design(*command), mention)
+
+
+def test_when_a_path_is_followed_expect_the_robot_of_the_artifact_and_never_another(
+    design: Design, tmp_path: Path
+) -> None:
+    path = {"name": "ray", "start": [0.0, -0.22], "segments": [{"line": {"to": [0.02, -0.22], "duration_s": 0.3}}]}
+    (tmp_path / "ray.json").write_text(json.dumps(path), encoding="utf-8")
+    write_artifact(tmp_path, release("fivebar", "pid").artifact)
+    of_the_artifact = ("track", "--trajectory", "ray.json", "--artifact", "artifact.json")
+    (row,) = json.loads(design(*of_the_artifact, "--json").out)
+    assert (row["scenario"], row["controller"]) == ("ray", "pid")
+    scenario = json.loads((tmp_path / "out/track/ray/pid/scenario.json").read_bytes())
+    assert scenario["plant"]["kind"] == "five-bar"
+    assert_refused(design(*of_the_artifact, "--robot", "arm3"), "--robot: got arm3, expected fivebar")
 
 
 # ---- hil and processes -----------------------------------------------------------------------------------------------

@@ -93,7 +93,7 @@ def test_when_the_run_has_an_envelope_expect_its_figure_in_the_gallery_and_else_
     with pytest.raises(ValueError, match="states no operating envelope"):
         envelope_figure(result)
     files = write_gallery(replace(result, envelope=envelope(KINDS[0])), tmp_path)
-    assert sum(file.stem == "envelope" for file in files) == 2
+    assert sum(file.stem == "envelope" for file in files) == 1
 
 
 @pytest.mark.full

@@ -26,7 +26,7 @@ from quasilpv.experiments.track import TrackingExperiment, run_from_columns, tra
 from quasilpv.release import release
 from quasilpv.scenarios import IdaIntegrator, Rk4Integrator, Scenario, Sensors, build_scenario
 from quasilpv.synthesis import Specification, TrackingDesign, synthesise
-from quasilpv.systems.registry import Robot
+from quasilpv.systems.registry import Robot, robot
 from reference.runs import synthetic_run
 
 EXACT = Sensors(encoder_bits=0, velocity_noise_rad_s=0.0)
@@ -333,4 +333,4 @@ def test_when_the_path_leaves_the_reach_of_the_arm_expect_one_line_with_the_reas
     path = {"name": "far", "tool_angle_rad": 0.785, "start": [1.3, -1.75], "segments": [line]}
     file.write_text(json.dumps(path), encoding="utf-8")
     with pytest.raises(InputError, match=r"far\.json: .*expected a distance|far\.json: .*expected \["):
-        TrackingExperiment.from_path_file(file, "arm3")
+        TrackingExperiment.from_path_file(file, robot("arm3"))

@@ -5,30 +5,31 @@ nothing.
 """
 
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
-
-try:
-    __version__ = version("quasilpv")
-except PackageNotFoundError:  # used from a checkout that is not installed
-    __version__ = "0+unknown"
 
 _HOMES = {
     "Answer": "studies.answer",
+    "Artifact": "artifact",
     "DescriptorSystem": "systems.descriptor",
     "Evidence": "studies.answer",
     "InputError": "errors",
     "Law": "studies.law",
     "Verdict": "studies.answer",
     "boundary": "studies.front_door",
+    "design": "chain",
+    "gate": "chain",
     "rate": "systems.equations",
     "region": "studies.front_door",
+    "robot": "chain",
+    "simulate": "chain",
     "solve": "studies.front_door",
     "structure_report": "systems.structure",
+    "verify": "chain",
 }
 
 __all__ = [
     "Answer",
+    "Artifact",
     "DescriptorSystem",
     "Evidence",
     "InputError",
@@ -36,18 +37,26 @@ __all__ = [
     "Verdict",
     "__version__",
     "boundary",
+    "design",
+    "gate",
     "rate",
     "region",
+    "robot",
+    "simulate",
     "solve",
     "structure_report",
+    "verify",
 ]
 
 
 def __getattr__(name: str) -> Any:
     """A name of the front door, from the module it lives in."""
-    if name not in _HOMES:
+    if name == "__version__":
+        value = _version()
+    elif name in _HOMES:
+        value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
 
@@ -55,3 +64,13 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     """The front door, for completion."""
     return sorted({*globals(), *__all__})
+
+
+def _version() -> str:
+    """Of the package as it is installed."""
+    from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415 -- half of what is loaded here
+
+    try:
+        return version(__name__)
+    except PackageNotFoundError:  # used from a checkout that is not installed
+        return "0+unknown"

@@ -1,3 +1,9 @@
+from quasilpv.artifact import Artifact as Artifact
+from quasilpv.chain import design as design
+from quasilpv.chain import gate as gate
+from quasilpv.chain import robot as robot
+from quasilpv.chain import simulate as simulate
+from quasilpv.chain import verify as verify
 from quasilpv.errors import InputError as InputError
 from quasilpv.studies.answer import Answer as Answer
 from quasilpv.studies.answer import Evidence as Evidence

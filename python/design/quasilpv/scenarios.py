@@ -206,6 +206,14 @@ class Scenario(StrictModel):
     torque_limit_nm: tuple[Positive, ...] | None = None
     initial: InitialState
 
+    def __repr__(self) -> str:
+        """What is simulated, in a line; `to_document` has all of it."""
+        return f"Scenario({self.name!r}, {self.plant.kind}, {self.plant.label!r}, {self.duration_s:g} s)"
+
+    def __str__(self) -> str:
+        """The same."""
+        return repr(self)
+
     @model_validator(mode="after")
     def _check_joints(self) -> Self:
         joints = self.plant.joints

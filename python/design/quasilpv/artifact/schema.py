@@ -107,6 +107,21 @@ class Artifact(StrictModel):
         """SHA-256 of the canonical JSON of the content, 64 hexadecimal digits."""
         return document_hash(self.content())
 
+    def __repr__(self) -> str:
+        """What it is, in a few lines; `content` has all of it."""
+        rate = f"{1.0 / self.sample_period_s:g} Hz"
+        stated = "nothing" if self.verification is None else ", ".join(self.verification)
+        lines = [
+            f"Artifact({self.name!r}, {self.law.kind} for {self.robot.id!r}, {self.joints} joints, {rate}",
+            f"  hash={self.hash}",
+            f"  verification={stated})",
+        ]
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        """The same."""
+        return repr(self)
+
     def content(self) -> Document:
         """Return the artifact as a JSON tree without its hash."""
         return self.model_dump(mode="json", by_alias=True)

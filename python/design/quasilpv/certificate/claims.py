@@ -131,6 +131,12 @@ class Verification:
     claims: tuple[Claim, ...]
     seconds: float
 
+    def __repr__(self) -> str:
+        """The verdict in a line; `claims` has all of it."""
+        word = "verified" if self.verified else f"NOT verified: {', '.join(self.failed[:3]) or 'no claim'}"
+        found = f"{len(self.claims)} inequalities, {self.evidence_in_words}" if self.claims else "nothing"
+        return f"Verification({word}; {found}; worst margin {self.worst_margin:.3g})"
+
     @property
     def verified(self) -> bool:
         """Whether there is at least one claim and every claim holds."""

@@ -65,6 +65,10 @@ class RobustGate:
     worst: WorstCase | None
     motion: bool | None = None
 
+    def __repr__(self) -> str:
+        """The verdict in a line."""
+        return f"RobustGate(passed={self.passed}, evidence={self.evidence}, delay_margin_s={self.delay_margin_s})"
+
     @property
     def passed(self) -> bool:
         """Whether the needed range is proved inside the margin for every constant delay up to the specified one.

@@ -60,6 +60,10 @@ class GridGate:
     delay_margin_s: float | None
     needed: NeededRange | None
 
+    def __repr__(self) -> str:
+        """The verdict in a line."""
+        return f"GridGate(passed={self.passed}, evidence={self.evidence}, delay_margin_s={self.delay_margin_s})"
+
     @property
     def passed(self) -> bool:
         """Whether every loop of the grid is stable at all delays tried up to the specified one, that one included."""

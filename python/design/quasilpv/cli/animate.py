@@ -8,7 +8,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from quasilpv.cli.console import JsonOption, Steps, print_json, print_note, progress
-from quasilpv.cli.options import EncoderOption, LogOption, PlantOption, RateOption, plant_kind
+from quasilpv.cli.options import EncoderOption, FormatOption, LogOption, PlantOption, RateOption, formats_of, plant_kind
 from quasilpv.cli.results import print_results
 from quasilpv.cli.session import Session, draw_results
 from quasilpv.experiments.result import TrackResult, Variant
@@ -38,6 +38,7 @@ def animate_command(
         Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for animations, run files and figures.")
     ] = Path("out/animate"),
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures of every run too.")] = True,
+    figure_formats: FormatOption = None,
     log: LogOption = True,
     json: JsonOption = False,
 ) -> None:
@@ -49,6 +50,7 @@ def animate_command(
     Example:
       design animate serial-square fivebar-spiral --rate-hz 2000
     """
+    formats = formats_of(figure_formats)
     experiments = [TrackingExperiment.registered(name) for name in dict.fromkeys(scenarios or DEFAULT_SCENARIOS)]
     bits = ENCODER_BITS if encoder_bits is None else encoder_bits
     variants = [Variant(DEFAULT_CONTROLLER, bits, compensated) for compensated in (False, True)]
@@ -65,7 +67,7 @@ def animate_command(
             made.append(_animate(session, experiment, pair, steps))
             results += pair
     if figures:
-        draw_results(results, out)
+        draw_results(results, out, formats)
     if json:
         print_json(made)
         return

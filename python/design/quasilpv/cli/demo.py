@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note
-from quasilpv.cli.options import specification
+from quasilpv.cli.options import FormatOption, formats_of, specification
 from quasilpv.cli.results import print_results
 from quasilpv.cli.session import Session, draw_results
 from quasilpv.cli.synth import write_released
@@ -26,6 +26,7 @@ def demo_command(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder of everything that is made.")] = Path(
         "out/demo"
     ),
+    figure_formats: FormatOption = None,
     json: JsonOption = False,
 ) -> None:
     """Design the default controller of the 3-DoF arm, then track the square and the circle with every controller.
@@ -41,6 +42,7 @@ def demo_command(
     Example:
       design demo
     """
+    formats = formats_of(figure_formats)
     claim_folder(out)
     if not json:
         print_note(f"a design for {ROBOT}, then every controller on {' and '.join(SCENARIOS)}: a few minutes")
@@ -49,7 +51,7 @@ def demo_command(
     )
     session = Session(None, None, "perturbed", out)
     results = run_all(session, [TrackingExperiment.registered(name) for name in SCENARIOS], default_variants())
-    draw_results(results, out)
+    draw_results(results, out, formats)
     if json:
         print_json({**released, "runs": [result.row() for result in results]})
     else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
@@ -13,6 +13,7 @@ import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
 from quasilpv.cli.logs import LogArtifactOption, open_log
+from quasilpv.cli.options import FormatOption, formats_of
 from quasilpv.errors import ClaimError, InputError
 from quasilpv.experiments.logged import logged_result
 from quasilpv.figures.gallery import write_gallery
@@ -42,6 +43,7 @@ def log_command(
         Path | None,
         typer.Option("-o", "--out", metavar="PATH", help="plot: folder; to-mcap: file.  [default: beside the log]"),
     ] = None,
+    figure_formats: FormatOption = None,
     json: JsonOption = False,
 ) -> None:
     """Look into the log that every run of design track and design hil writes.
@@ -60,7 +62,14 @@ def log_command(
     """
     if out is not None and action not in (Action.PLOT, Action.TO_MCAP):
         raise InputError("command line", "-o", out, f"nothing beside {action.value}, which writes no file")
-    _ACTIONS[action](open_log(log, artifact), out, json)
+    if figure_formats and action is not Action.PLOT:
+        raise InputError("command line", "--figure-format", ", ".join(figure_formats), "nothing but beside plot")
+    formats = formats_of(figure_formats)
+    opened = open_log(log, artifact)
+    if action is Action.PLOT:
+        _plot(opened, out, formats, json)
+    else:
+        _ACTIONS[action](opened, out, json)
 
 
 def _info(log: RunLog, _: Path | None, json: bool) -> None:
@@ -122,10 +131,10 @@ def _cell(value: float | None) -> str:
     return "-" if value is None else f"{value:g}"
 
 
-def _plot(log: RunLog, out: Path | None, json: bool) -> None:
+def _plot(log: RunLog, out: Path | None, formats: Sequence[str], json: bool) -> None:
     folder = out or Path(log.source).parent
     claim_folder(folder)
-    files = write_gallery(logged_result(log), folder)
+    files = write_gallery(logged_result(log), folder, formats)
     if json:
         print_json({"figures": [str(path) for path in files]})
     else:
@@ -155,7 +164,6 @@ def _to_mcap(log: RunLog, out: Path | None, json: bool) -> None:
 
 _ACTIONS: Mapping[Action, Callable[[RunLog, Path | None, bool], None]] = {
     Action.INFO: _info,
-    Action.PLOT: _plot,
     Action.REPLAY: _replay,
     Action.TO_MCAP: _to_mcap,
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
@@ -11,8 +12,9 @@ from quasilpv.artifact import Artifact
 from quasilpv.errors import InputError, one_of
 from quasilpv.experiments.designs import kept_design
 from quasilpv.experiments.result import Variant
+from quasilpv.figures.style import DEFAULT_FORMATS, require_formats
 from quasilpv.scenarios import ENCODER_BITS, Sensors
-from quasilpv.synthesis import CONTROLLERS, ControllerKind, Specification, controller_kind
+from quasilpv.synthesis import CONTROLLERS, ControllerKind, Specification, specification_for
 from quasilpv.synthesis.acceleration_design import Progress
 from quasilpv.systems.registry import robot
 
@@ -60,6 +62,10 @@ PlantOption: TypeAlias = Annotated[
     str, typer.Option("--plant", help="nominal, or perturbed: the full payload the design must cover.")
 ]
 LogOption: TypeAlias = Annotated[bool, typer.Option("--log/--no-log", help="Write the log of every run.")]
+FormatOption: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option("--figure-format", metavar="FORMAT", help="png, svg or pdf; may be repeated.  [default: png]"),
+]
 ArtifactOption: TypeAlias = Annotated[
     Path | None, typer.Option("--artifact", metavar="FILE", help="Use this controller instead of designing one.")
 ]
@@ -74,6 +80,15 @@ def plant_kind(text: str) -> str:
     if text not in ("nominal", "perturbed"):
         raise InputError("command line", "--plant", text, "nominal or perturbed")
     return text
+
+
+def formats_of(names: Sequence[str] | None) -> tuple[str, ...]:
+    """The formats figures are drawn in.
+
+    Raises:
+        InputError: one is none of `quasilpv.figures.style.FORMATS`.
+    """
+    return require_formats(names or DEFAULT_FORMATS)
 
 
 def sensors_of(encoder_bits: int) -> Sensors:
@@ -108,20 +123,18 @@ def specification(
     margin_spare: float | None = None,
     torque_activity: float | None = None,
 ) -> Specification:
-    """The specification for these numbers; what is not given, and exact angles (0 bits), keep their default.
-
-    The default rate is the controller's own, the frequency of disturbances the robot's.
+    """The specification of `specification_for`, for a robot by name.
 
     Raises:
         InputError: an unknown robot, or a number out of range.
     """
-    defaults = Specification()
-    return Specification(
-        rate_hz=controller_kind(controller).rate_hz if rate_hz is None else rate_hz,
-        encoder_bits=encoder_bits or defaults.encoder_bits,
-        margin_spare=defaults.margin_spare if margin_spare is None else margin_spare,
-        torque_activity=defaults.torque_activity if torque_activity is None else torque_activity,
-        disturbance_frequency_rad_s=robot(robot_id).disturbance_frequency_rad_s,
+    return specification_for(
+        robot(robot_id),
+        controller,
+        rate_hz=rate_hz,
+        encoder_bits=encoder_bits,
+        margin_spare=margin_spare,
+        torque_activity=torque_activity,
     )
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note, progress
+from quasilpv.cli.options import FormatOption, formats_of
 from quasilpv.cli.parameters import asks_one_question, axis
 from quasilpv.errors import InputError
 from quasilpv.figures.region import region_figure
@@ -40,6 +42,7 @@ def region_command(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Where results are kept.")] = Path(
         "out/region"
     ),
+    figure_formats: FormatOption = None,
     json: JsonOption = False,
 ) -> None:
     """Map where a condition is feasible; whatever is called feasible is proved in exact arithmetic.
@@ -52,6 +55,7 @@ def region_command(
     Example:
       design region ex-I.1 --condition II.6 --x a=-8:8:17 --y b=-20:20:41
     """
+    formats = formats_of(figure_formats)
     across, up = axis(x, "--x"), axis(y, "--y")
     if processes is not None and not 1 <= processes <= MOST_PROCESSES:
         raise InputError("command line", "--processes", processes, f"1 to {MOST_PROCESSES}")
@@ -65,7 +69,7 @@ def region_command(
         evaluation = Map(asked, across, up, solver=solver, memory=memory, progress=steps.parts)
         kind = _AREAS if grid is None and evaluation.proves_areas else _GRID if grid else _ADAPTIVE
         region = {_AREAS: evaluation.areas, _GRID: evaluation.full, _ADAPTIVE: evaluation.adaptive}[kind]()
-    written = _write(region, memory.map_stem(across, up, kind))
+    written = _write(region, memory.map_stem(across, up, kind), formats)
     if json:
         print_json(region.to_document())
         return
@@ -92,8 +96,8 @@ def _points_only(x: Axis, y: Axis, *, possible: bool) -> str:
     return f"points only: the data are not affine in {x.name} and {y.name}, nothing is proved between points"
 
 
-def _write(region: Region, stem: Path) -> list[Path]:
+def _write(region: Region, stem: Path, formats: Sequence[str]) -> list[Path]:
     """The map and its figure."""
     document = stem.with_name(f"{stem.name}.json")
     write_readable_json(document, region.to_document())
-    return [document, *save(region_figure([region]), stem)]
+    return [document, *save(region_figure([region]), stem, formats)]

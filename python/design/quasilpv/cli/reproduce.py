@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table, progress
+from quasilpv.cli.options import FormatOption, formats_of
 from quasilpv.errors import InputError
 from quasilpv.files import claim_folder
 from quasilpv.reproduction import ITEMS, Effort, item, reproduce
@@ -23,6 +24,7 @@ def reproduce_command(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Where results and figures are kept.")] = Path(
         "out/reproduction"
     ),
+    figure_formats: FormatOption = None,
     json: JsonOption = False,
 ) -> None:
     """Regenerate figures and tables of the source: figure, numbers, and a verdict computed from them.
@@ -38,11 +40,12 @@ def reproduce_command(
     if everything == bool(ids):
         got = "both items and --all" if ids else "nothing"
         raise InputError("command line", "reproduce", got, "--all, or items of design list")
+    formats = formats_of(figure_formats)
     wanted = list(ITEMS.values()) if everything else [item(name) for name in dict.fromkeys(ids or ())]
     claim_folder(out)
     with progress(len(wanted)) as steps:
         effort = Effort.QUICK if quick else Effort.FULL
-        rows = reproduce(wanted, effort, out, begin=steps.begin, end=steps.end)
+        rows = reproduce(wanted, effort, out, formats=formats, begin=steps.begin, end=steps.end)
     if json:
         print_json(rows)
         return

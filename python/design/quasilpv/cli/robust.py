@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from flint import fmpq
-from matplotlib.figure import Figure
 
 from quasilpv.artifact import read_artifact
 from quasilpv.certificate import Gate, gate
-from quasilpv.certificate.gate import RobustGate, margin_curve
+from quasilpv.certificate.gate import RobustGate
 from quasilpv.certificate.gate_rationals import to_float
-from quasilpv.certificate.grid_gate import GridGate, growth_curves
+from quasilpv.certificate.grid_gate import GridGate
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
-from quasilpv.figures.growth import growth_figure
-from quasilpv.figures.margins import margin_figure
+from quasilpv.cli.options import FormatOption, formats_of
+from quasilpv.figures.gate import gate_figure
 from quasilpv.figures.style import save
 from quasilpv.files import claim_folder
 
 MARGIN_FIGURE, GROWTH_FIGURE = "inertia-margin", "growth-rate"
-BEYOND_THE_MARGIN = fmpq(3, 2)
-SHORTEST_CURVE_SAMPLES = fmpq(1)
 WHILE = "while no torque or slew limit acts"
 
 
@@ -33,6 +30,7 @@ def robust_command(
         Path | None,
         typer.Option("-o", "--out", metavar="DIR", help="Draw what the gate found into this folder."),
     ] = None,
+    figure_formats: FormatOption = None,
     json: JsonOption = False,
 ) -> int:
     """Ask whether the frozen loop is stable in every posture, with every payload, with up to half a sample of delay.
@@ -44,6 +42,7 @@ def robust_command(
     Example:
       design robust out/arm3/artifact.json -o out/arm3
     """
+    formats = formats_of(figure_formats)
     if out is not None:
         claim_folder(out)
     found = gate(read_artifact(artifact).content(), str(artifact))
@@ -54,24 +53,15 @@ def robust_command(
         print_table(str(artifact), ("", ""), [*rows, ("evidence", found.evidence.value)], left_columns=2)
         print(verdict)
     if out is not None:
-        for path in _draw(found, out):
+        for path in _draw(found, out, formats):
             print_note(f"wrote {path}")
     return 0 if found.passed else 1
 
 
-def _draw(found: Gate, out: Path) -> list[Path]:
+def _draw(found: Gate, out: Path, formats: Sequence[str]) -> list[Path]:
     """The figure of either gate."""
-    if isinstance(found, GridGate):
-        return save(growth_figure(found, growth_curves(found)), out / GROWTH_FIGURE)
-    return save(_margin_figure(found), out / MARGIN_FIGURE)
-
-
-def _margin_figure(gate: RobustGate) -> Figure:
-    """The margin from no delay to well beyond the delay margin."""
-    longest = max(SHORTEST_CURVE_SAMPLES, gate.specified_delay_samples * 2)
-    if gate.delays is not None and gate.delays.proved is not None:
-        longest = max(longest, gate.delays.proved * BEYOND_THE_MARGIN)
-    return margin_figure(gate, margin_curve(gate.loop, longest))
+    name = GROWTH_FIGURE if isinstance(found, GridGate) else MARGIN_FIGURE
+    return save(gate_figure(found), out / name, formats)
 
 
 def _grid_answer(found: GridGate) -> tuple[list[tuple[str, str]], str]:

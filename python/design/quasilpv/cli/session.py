@@ -18,6 +18,7 @@ from quasilpv.experiments.track import (
     track,
 )
 from quasilpv.figures.gallery import write_comparison, write_gallery
+from quasilpv.figures.style import DEFAULT_FORMATS
 from quasilpv.files import claim_folder
 from quasilpv.telemetry import LOG_NAME
 from quasilpv.telemetry.log import point_to
@@ -73,13 +74,15 @@ class Session:
         return result
 
 
-def draw_results(results: Sequence[TrackResult], out: Path) -> None:
-    """Draw every run, and all runs of a scenario beside each other."""
+def draw_results(results: Sequence[TrackResult], out: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
+    """Draw every run, and beside each other those of a scenario that has several."""
     with progress(len(results)) as steps:
         for result in results:
             steps.begin(f"figures: {result.title}")
-            write_gallery(result, out / result.scenario / result.variant.slug)
+            write_gallery(result, out / result.scenario / result.variant.slug, formats)
             steps.end()
     for scenario in dict.fromkeys(result.scenario for result in results):
-        write_comparison([result for result in results if result.scenario == scenario], out / scenario)
+        runs = [result for result in results if result.scenario == scenario]
+        if len(runs) > 1:
+            write_comparison(runs, out / scenario, formats)
     print_note(f"figures are under {out}")

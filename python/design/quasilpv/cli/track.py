@@ -13,9 +13,11 @@ from quasilpv.cli.console import JsonOption, print_json, progress
 from quasilpv.cli.options import (
     ArtifactOption,
     EncoderOption,
+    FormatOption,
     LogOption,
     PlantOption,
     RateOption,
+    formats_of,
     plant_kind,
     require_controller,
     sensors_of,
@@ -24,10 +26,11 @@ from quasilpv.cli.results import print_results, print_warnings
 from quasilpv.cli.session import Session, draw_results
 from quasilpv.errors import InputError
 from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, variant_of
+from quasilpv.experiments.track import PlantKind, TrackingExperiment, robot_of, variant_of
 from quasilpv.files import write_readable_json
 from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
+from quasilpv.systems.registry import Robot, robot
 
 DEFAULT_CONTROLLERS = (
     "pid",
@@ -40,7 +43,6 @@ DEFAULT_CONTROLLERS = (
     "dob-acceleration",
 )
 COARSE_ENCODER_BITS = 17
-PATH_ROBOT = "arm3"
 
 
 def track_command(
@@ -61,6 +63,10 @@ def track_command(
         Path | None,
         typer.Option("--trajectory", metavar="FILE", help="Follow the waypoints and arcs of this file as well."),
     ] = None,
+    robot_id: Annotated[
+        str | None,
+        typer.Option("--robot", metavar="ID", help="Which robot follows --trajectory.  [default: that of --artifact]"),
+    ] = None,
     encoder_bits: EncoderOption = None,
     plant: PlantOption = "perturbed",
     no_compensation: Annotated[
@@ -72,6 +78,7 @@ def track_command(
     figures: Annotated[
         bool | None, typer.Option("--figures/--no-figures", help="Draw figures.  [default: not with --json]")
     ] = None,
+    figure_formats: FormatOption = None,
     log: LogOption = True,
     json: JsonOption = False,
 ) -> None:
@@ -81,20 +88,24 @@ def track_command(
     out/cache and made again when anything they depend on changes.
 
     \b
-    Example:
+    Examples:
       design track serial-square serial-circle --controller dob-acceleration
+      design track --trajectory path.json --robot fivebar
     """
+    formats = formats_of(figure_formats)
+    given = None if artifact is None else _given(artifact, controllers, rate_hz, no_compensation)
     experiments = [TrackingExperiment.registered(name) for name in dict.fromkeys(scenarios or [])]
     if trajectory is not None:
-        experiments.append(TrackingExperiment.from_path_file(trajectory, PATH_ROBOT))
+        experiments.append(TrackingExperiment.from_path_file(trajectory, _follower(given, robot_id)))
+    elif robot_id is not None:
+        raise InputError("command line", "--robot", robot_id, "nothing without --trajectory: a scenario has its robot")
     if not experiments:
         raise InputError("command line", "SCENARIO", "nothing", "at least one scenario id or --trajectory FILE")
-    given = None if artifact is None else _given(artifact, controllers, rate_hz, no_compensation)
     variants = _variants(given, controllers, encoder_bits, no_compensation)
     session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
     results = run_all(session, experiments, variants)
     if not json if figures is None else figures:
-        draw_results(results, out)
+        draw_results(results, out, formats)
     if json:
         print_json([result.row() for result in results])
     else:
@@ -131,6 +142,21 @@ def _given(path: Path, controllers: Sequence[str] | None, rate_hz: float | None,
         if value:
             raise InputError("command line", option, value, "nothing beside --artifact, which fixes the controller")
     return read_artifact(path)
+
+
+def _follower(given: Artifact | None, robot_id: str | None) -> Robot:
+    """The robot that follows a path: that of the controller, or the one that is named. None is assumed.
+
+    Raises:
+        InputError: there is neither, they differ, or the registry does not know the robot.
+    """
+    if given is None and robot_id is None:
+        raise InputError("command line", "--robot", "nothing", "who follows --trajectory, or --artifact FILE")
+    if given is None:
+        return robot(str(robot_id))
+    if robot_id not in (None, given.robot.id):
+        raise InputError("command line", "--robot", robot_id, f"{given.robot.id}, which --artifact is for")
+    return robot_of(given)
 
 
 def _variants(

@@ -56,8 +56,8 @@ def compute_metrics(run: Run, tool_error_m: FloatArray) -> Metrics:
 
     Args:
         run: the record.
-        tool_error_m: (N, 2) m, position error of the tool, FK(true angle) - FK(reference angle), in the base frame (X to
-            the right, Y up). True angles, not measured ones: the encoder's rounding is not excused.
+        tool_error_m: (N, 2) m, position error of the tool, FK(true angle) - FK(reference angle), in the base frame (X
+            to the right, Y up). True angles, not measured ones: the encoder's rounding is not excused.
     """
     error = tool_error_m
     rms_x, rms_y = np.sqrt(np.mean(np.square(error), axis=0))

@@ -89,6 +89,10 @@ class TrackResult:
     true_disturbance: Disturbance | None
     envelope: OperatingEnvelope | None = None
 
+    def __repr__(self) -> str:
+        """What ran, in a line, and its numbers in another."""
+        return f"TrackResult({self.title}, {self.plant} plant, {self.rate_hz:g} Hz\n  {self.metrics})"
+
     @property
     def title(self) -> str:
         """Scenario and label, for titles of figures."""

@@ -50,6 +50,10 @@ class Run:
     flags: IntArray
     premise_excess: FloatArray
 
+    def __repr__(self) -> str:
+        """Its size in a line."""
+        return f"Run({self.time_s.size} samples of {self.joints} joints, {self.sample_period_s:g} s each)"
+
     @property
     def joints(self) -> int:
         """Number of joints n."""

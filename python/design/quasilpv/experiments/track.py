@@ -27,7 +27,7 @@ from quasilpv.scenarios import (
     write_scenario,
 )
 from quasilpv.systems.mechanism import PlanarMechanism
-from quasilpv.systems.registry import Robot, robot
+from quasilpv.systems.registry import Robot, robot, robots
 from quasilpv.telemetry import LOG_NAME, Mode, RunHeader
 from quasilpv.telemetry.recording import RunDocuments, write_run
 from quasilpv.trajectories import Trajectory, plan, read_path, write_trajectory
@@ -73,15 +73,35 @@ class TrackingExperiment:
         )
 
     @classmethod
-    def from_path_file(cls, path: Path | str, robot_id: str) -> TrackingExperiment:
+    def from_path_file(cls, path: Path | str, task_robot: Robot) -> TrackingExperiment:
         """The experiment in which a robot follows the task-space path of a file.
 
         Raises:
             InputError: the file is not a path, or the path is unreachable, singular, or outside the modelling box.
         """
-        task_robot = robot(robot_id)
         trajectory = plan(task_robot.model, read_path(path), task_robot.domain, source=str(path))
         return cls(trajectory.name, task_robot, trajectory)
+
+
+def robot_of(artifact: Artifact) -> Robot:
+    """The robot of the registry that an artifact was designed for.
+
+    Raises:
+        InputError: the registry does not know it, or knows another one by this name.
+    """
+    known = {entry.id: entry for entry in robots()}
+    source = known.get(artifact.robot.id)
+    if source is None:
+        expected = f"one of the registry, {', '.join(known)}, or the robot itself beside the artifact"
+        raise InputError(artifact.name, "robot.id", artifact.robot.id, expected)
+    for field, shipped, own in (
+        ("robot.parameters", artifact.robot.parameters, source.model.parameters_document()),
+        ("payloads", artifact.payloads, source.payloads.to_document()),
+    ):
+        if canonical_json(shipped) != canonical_json(own):
+            expected = f"those of {source.id} in the registry, or the robot itself beside the artifact"
+            raise InputError(artifact.name, field, "others", expected)
+    return source
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,9 @@ from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, new_figure, style
 
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""Digits of exponents as plain text: the parser of mathematical text takes longer than the rest of the figure."""
+
 
 def envelope_figure(result: TrackResult) -> Figure:
     """Per joint: the run in the operating domain with the tube of the stated margin, and its errors in two sets.
@@ -101,4 +104,4 @@ def _number(value: float) -> str:
     if 0.1 <= value < 1e4:
         return f"{value:.2g}" if value < 100 else f"{value:.0f}"
     exponent = math.floor(math.log10(value)) if value > 0.0 else 0
-    return rf"{value / 10.0**exponent:.1f}$\cdot$10$^{{{exponent}}}$"
+    return f"{value / 10.0**exponent:.1f}·10{str(exponent).translate(SUPERSCRIPTS)}"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+
+from matplotlib.figure import Figure
 
 from quasilpv.experiments.result import TrackResult
 from quasilpv.figures.comparison import comparison_figure
@@ -17,6 +19,22 @@ from quasilpv.figures.tracking import (
     velocity_figure,
 )
 
+FIGURES: Mapping[str, Callable[[TrackResult], Figure]] = {
+    "path": path_figure,
+    "errors": error_figure,
+    "torques": torque_figure,
+    "velocity": velocity_figure,
+    "disturbance": disturbance_figure,
+    "envelope": envelope_figure,
+}
+"""All figures of a run, by name."""
+
+
+def figures_of(result: TrackResult) -> list[str]:
+    """Names of the figures that a run has: of the disturbance and of the envelope only if its law knows them."""
+    missing = {"disturbance": result.true_disturbance is None, "envelope": result.envelope is None}
+    return [name for name in FIGURES if not missing.get(name)]
+
 
 def write_gallery(result: TrackResult, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> list[Path]:
     """Write path, errors, torques, speed error and, if the law has them, disturbance and operating envelope of a run.
@@ -27,17 +45,8 @@ def write_gallery(result: TrackResult, folder: Path, formats: Sequence[str] = DE
     Raises:
         InputError: the folder cannot be written.
     """
-    figures = {
-        "path": path_figure,
-        "errors": error_figure,
-        "torques": torque_figure,
-        "velocity": velocity_figure,
-    }
-    if result.true_disturbance is not None:
-        figures["disturbance"] = disturbance_figure
-    if result.envelope is not None:
-        figures["envelope"] = envelope_figure
-    return [file for name, draw in figures.items() for file in save(draw(result), folder / name, formats)]
+    drawn = {name: FIGURES[name](result) for name in figures_of(result)}
+    return [file for name, figure in drawn.items() for file in save(figure, folder / name, formats)]
 
 
 def write_comparison(

@@ -24,6 +24,33 @@ from quasilpv.figures.style import (
 )
 
 
+def plot_path(axes: Axes, result: TrackResult) -> None:
+    """Draw the tool's path in the plane over its reference, m."""
+    axes.plot(*result.reference_position_m.T, color=REFERENCE_COLOUR, linewidth=2.2, label="reference")
+    axes.plot(*result.tool_position_m.T, color=BLUE, linewidth=1.0, label="tool")
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlabel("X (m)")
+    axes.set_ylabel("Y (m)")
+    legend_above(axes)
+
+
+def plot_error(axes: Axes, result: TrackResult) -> None:
+    """Draw the distance of the tool from its reference over time."""
+    distance = np.hypot(*(result.tool_position_m - result.reference_position_m).T)
+    unit = length_unit(float(distance.max()))
+    axes.plot(result.run.time_s, distance * unit.factor, color=BLUE, linewidth=0.8)
+    axes.set_ylabel(f"distance from the reference ({unit.name})")
+    label_time(axes, result.run.time_s)
+
+
+def plot_torque(axes: Axes, result: TrackResult) -> None:
+    """Draw the applied torque of every joint over time."""
+    plot_joints(axes, result.run.time_s, result.run.torque_nm)
+    axes.set_ylabel("torque (N m)")
+    legend_above(axes)
+    label_time(axes, result.run.time_s)
+
+
 def path_figure(result: TrackResult) -> Figure:
     """The tool's path in the plane over its reference, and the same path with the error exaggerated.
 

@@ -29,8 +29,8 @@ def reproduce(
 ) -> list[Mapping[str, Any]]:
     """Compute items and write figures, ``<id>.json`` each, and all current rows as ``results.json``, ``results.md``.
 
-    An item whose result is already in the folder, computed with the same effort from the same code and drawn in these formats, is not computed
-    again: an interrupted run goes on where it stopped.
+    An item whose result is already in the folder, computed with the same effort from the same code and drawn in these
+    formats, is not computed again: an interrupted run goes on where it stopped.
 
     Args:
         items: which.

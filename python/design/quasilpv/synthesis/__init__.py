@@ -94,6 +94,7 @@ __all__ = [
     "Specification",
     "TrackingDesign",
     "controller_kind",
+    "specification_for",
     "synthesise",
     "without_compensation",
 ]
@@ -108,6 +109,36 @@ def controller_kind(controller: str) -> ControllerKind:
     if controller not in CONTROLLERS:
         raise InputError("controllers", "controller", controller, one_of(CONTROLLERS, controller))
     return CONTROLLERS[controller]
+
+
+def specification_for(
+    robot: Robot,
+    controller: str = DEFAULT_CONTROLLER,
+    *,
+    rate_hz: float | None = None,
+    encoder_bits: int | None = None,
+    margin_spare: float | None = None,
+    torque_activity: float | None = None,
+) -> Specification:
+    """The specification for these numbers; what is not given, and exact angles (0 bits), keep their default.
+
+    The default rate is the controller's own, the frequency of disturbances the robot's.
+
+    Args:
+        robot: what is designed for.
+        controller: one of `CONTROLLERS`.
+        rate_hz, encoder_bits, margin_spare, torque_activity: see `Specification`.
+
+    Raises:
+        InputError: an unknown controller, or a number out of range.
+    """
+    return Specification(
+        rate_hz=controller_kind(controller).rate_hz if rate_hz is None else rate_hz,
+        encoder_bits=encoder_bits or Specification.encoder_bits,
+        margin_spare=Specification.margin_spare if margin_spare is None else margin_spare,
+        torque_activity=Specification.torque_activity if torque_activity is None else torque_activity,
+        disturbance_frequency_rad_s=robot.disturbance_frequency_rad_s,
+    )
 
 
 def synthesise(
@@ -132,8 +163,7 @@ def synthesise(
         InfeasibleError: no design meets the specification.
     """
     kind = controller_kind(controller)
-    default = Specification(rate_hz=kind.rate_hz, disturbance_frequency_rad_s=robot.disturbance_frequency_rad_s)
-    return kind.design(robot, specification or default, progress)
+    return kind.design(robot, specification or specification_for(robot, controller), progress)
 
 
 def without_compensation(design: TrackingDesign) -> TrackingDesign:

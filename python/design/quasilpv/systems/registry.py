@@ -42,6 +42,10 @@ class Robot:
     printed_bandwidth_rad_s: float = 15.0 * pi
     friction_bound_nm_s: float = 10.0
 
+    def __repr__(self) -> str:
+        """Its name and its line of the listing."""
+        return f"Robot({self.id!r}: {self.summary})"
+
     def with_payload_fraction(self, fraction: float) -> PlanarMechanism:
         """The plant at a payload fraction in [0, 1]; 0 is the nominal robot. See `PayloadSet`."""
         return self.model.perturbed(*self.payloads.scales_at(fraction))

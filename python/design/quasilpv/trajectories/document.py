@@ -89,6 +89,12 @@ class Trajectory:
         self.knots_s.setflags(write=False)
         self.coefficients.setflags(write=False)
 
+    def __repr__(self) -> str:
+        """Its size in a line."""
+        return (
+            f"Trajectory({self.name!r}, {self.joints} joints, {len(self.coefficients)} segments, {self.duration_s:g} s)"
+        )
+
     @property
     def joints(self) -> int:
         """Number of joints n."""

@@ -1,0 +1,30 @@
+"""The figure of a gate, whichever it is."""
+
+from __future__ import annotations
+
+from flint import fmpq
+from matplotlib.figure import Figure
+
+from quasilpv.certificate import Gate
+from quasilpv.certificate.gate import RobustGate, margin_curve
+from quasilpv.certificate.grid_gate import GridGate, growth_curves
+from quasilpv.figures.growth import growth_figure
+from quasilpv.figures.margins import margin_figure
+
+BEYOND_THE_MARGIN = fmpq(3, 2)
+SHORTEST_CURVE_SAMPLES = fmpq(1)
+
+
+def gate_figure(found: Gate) -> Figure:
+    """What a gate found over the delay: growth rates on the grid, or the proved inertia margin."""
+    if isinstance(found, GridGate):
+        return growth_figure(found, growth_curves(found))
+    return margin_figure(found, margin_curve(found.loop, _longest_delay(found)))
+
+
+def _longest_delay(gate: RobustGate) -> fmpq:
+    """Well beyond the delay margin, samples."""
+    longest = max(SHORTEST_CURVE_SAMPLES, gate.specified_delay_samples * 2)
+    if gate.delays is not None and gate.delays.proved is not None:
+        longest = max(longest, gate.delays.proved * BEYOND_THE_MARGIN)
+    return longest
