@@ -37,9 +37,11 @@ inline Trajectory trajectory() {
   return Trajectory::parse(json_twin(table), "test");
 }
 
-/// With a Lyapunov bound for the monitor, where the kind has one.
-inline Artifact artifact(const std::string& kind = "dob-acceleration") {
+/// With a Lyapunov bound for the monitor, where the kind has one. The domain holds the speeds to which the disturbances
+/// of these runs drive the light arm.
+inline Artifact artifact(const std::string& kind = "dob-acceleration", double fastest_rad_s = 50.0) {
   Json table = artifact_table(kind, kJoints);
+  table["domain"]["speed_rad_s"] = std::vector<Json>(kJoints, Json::array({-fastest_rad_s, fastest_rad_s}));
   if (kind == "dob-acceleration") {
     table["law"]["lyapunov_bound"] = TestArm{kJoints}.lyapunov_bound();
   }

@@ -63,7 +63,7 @@ double follow(ControlLoop& loop, DesignPlant& plant, std::int64_t first, std::in
 
 /// The first torque of the law without an error: at rest where the arm is, with the acceleration of the reference.
 Eigen::VectorXd own_torque(const std::string& kind, const DesignPlant& plant, std::int64_t seq) {
-  Controller law(artifact(kind));
+  Controller law(artifact(kind, kDomainSpeed));
   StepInput input;
   input.angle = to_joint_array(plant.angle);
   input.reference.angle = input.angle;
@@ -80,7 +80,7 @@ LoopSettings bumpless() {
 class Start : public ::testing::TestWithParam<const char*> {
  protected:
   double undisturbed() const {
-    ControlLoop loop(artifact(GetParam()), trajectory(), {});
+    ControlLoop loop(artifact(GetParam(), kDomainSpeed), trajectory(), {});
     DesignPlant plant = DesignPlant::on(path(0));
     return follow(loop, plant, 0, kSamples);
   }
@@ -90,7 +90,7 @@ class Start : public ::testing::TestWithParam<const char*> {
   void expect_gentle(DesignPlant plant, std::int64_t first) const {
     const double surplus = (plant.speed - to_vector(path(first).speed, kJoints)).cwiseAbs().maxCoeff();
     const Eigen::VectorXd own = own_torque(GetParam(), plant, first);
-    ControlLoop loop(artifact(GetParam()), trajectory(), bumpless());
+    ControlLoop loop(artifact(GetParam(), kDomainSpeed), trajectory(), bumpless());
     loop.handle(plant.reading(first), at(first));
     const Eigen::VectorXd torque = to_vector(loop.command().torque_nm, kJoints);
     EXPECT_LE((torque - own).cwiseAbs().maxCoeff(), 0.05 * kTorqueLimit);
@@ -120,7 +120,7 @@ TEST_P(Start, F11_while_the_arm_moves_with_and_against_the_reference_is_gentle_i
 }
 
 TEST_P(Start, F11_without_a_measurement_waits_and_then_begins_where_the_arm_is) {
-  ControlLoop loop(artifact(GetParam()), trajectory(), bumpless());
+  ControlLoop loop(artifact(GetParam(), kDomainSpeed), trajectory(), bumpless());
   DesignPlant plant = DesignPlant::on(path(0));
   plant.angle.array() += 0.1;
   loop.handle(reading(0, {kNaN, kNaN, kNaN}), at(0));
@@ -131,7 +131,7 @@ TEST_P(Start, F11_without_a_measurement_waits_and_then_begins_where_the_arm_is) 
 }
 
 TEST_P(Start, F11_out_of_a_fault_begins_at_the_torque_of_the_law_without_an_error) {
-  ControlLoop loop(artifact(GetParam()), trajectory(), {});
+  ControlLoop loop(artifact(GetParam(), kDomainSpeed), trajectory(), {});
   DesignPlant plant = DesignPlant::on(path(0));
   follow(loop, plant, 0, 300);
   for (std::int64_t seq = 300; seq < 320; ++seq) {
@@ -155,7 +155,7 @@ TEST_P(Start, F19_an_angle_outside_the_domain_is_refused_by_name_before_any_torq
       for (const bool bumpless_start : {false, true}) {
         LoopSettings settings;
         settings.bumpless_start = bumpless_start;
-        ControlLoop loop(artifact(GetParam()), trajectory(), settings);
+        ControlLoop loop(artifact(GetParam(), kDomainSpeed), trajectory(), settings);
         RobotReading first = reading(0);
         first.angle_rad[joint] += beside;
         loop.handle(first, at(0));
@@ -176,8 +176,8 @@ TEST_P(Start, F19_an_angle_outside_the_domain_is_refused_by_name_before_any_torq
 TEST_P(Start, F20_one_measurement_turns_away_is_predicted_like_a_lost_one_and_counted) {
   for (std::size_t joint = 0; joint < kJoints; ++joint) {
     for (const double jump : {-2 * kTurn, -kTurn, kTurn, 0.5, -0.1, 0.02}) {
-      ControlLoop loop(artifact(GetParam()), trajectory(), {});
-      ControlLoop twin(artifact(GetParam()), trajectory(), {});
+      ControlLoop loop(artifact(GetParam(), kDomainSpeed), trajectory(), {});
+      ControlLoop twin(artifact(GetParam(), kDomainSpeed), trajectory(), {});
       DesignPlant plant = DesignPlant::on(path(0));
       for (std::int64_t seq = 0; seq < 260; ++seq) {
         RobotReading told = plant.reading(seq);
@@ -199,7 +199,7 @@ TEST_P(Start, F20_one_measurement_turns_away_is_predicted_like_a_lost_one_and_co
 TEST_P(Start, F20_measurements_that_stay_turns_away_are_a_fault_at_the_20th_and_no_reset_leaves_it) {
   for (std::size_t joint = 0; joint < kJoints; ++joint) {
     for (const double jump : {-kTurn, kTurn, 3 * kTurn, 0.3}) {
-      ControlLoop loop(artifact(GetParam()), trajectory(), {});
+      ControlLoop loop(artifact(GetParam(), kDomainSpeed), trajectory(), {});
       DesignPlant plant = DesignPlant::on(path(0));
       follow(loop, plant, 0, 200);
       for (std::int64_t seq = 200; seq < 300; ++seq) {
@@ -220,7 +220,7 @@ TEST_P(Start, F20_measurements_that_stay_turns_away_are_a_fault_at_the_20th_and_
 
 TEST_P(Start, F20_before_the_arm_moves_a_jump_is_not_taken_for_speed) {
   for (const double jump : {-kTurn, kTurn, 0.3}) {
-    ControlLoop loop(artifact(GetParam()), trajectory(), bumpless());
+    ControlLoop loop(artifact(GetParam(), kDomainSpeed), trajectory(), bumpless());
     loop.handle(reading(0), at(0));
     for (std::int64_t seq = 1; seq <= 20; ++seq) {
       loop.handle(reading(seq, {kStart[0], kStart[1] + jump, kStart[2]}), at(seq));
@@ -232,7 +232,7 @@ TEST_P(Start, F20_before_the_arm_moves_a_jump_is_not_taken_for_speed) {
 
 // 5 rad/s, the domain's being 2: every step is possible, the speed is not.
 TEST_P(Start, F21_a_speed_beyond_twice_the_domains_is_a_fault) {
-  ControlLoop loop(artifact(GetParam()), trajectory(), {});
+  ControlLoop loop(artifact(GetParam(), kDomainSpeed), trajectory(), {});
   std::int64_t seq = 0;
   for (; seq < 300 && loop.state() != ControllerState::kFault; ++seq) {
     RobotReading told = reading(seq, {kStart[0], kStart[1], kStart[2] - 5.0 * T * static_cast<double>(seq)});
@@ -246,7 +246,7 @@ TEST_P(Start, F21_a_speed_beyond_twice_the_domains_is_a_fault) {
 }
 
 TEST_P(Start, F21_the_largest_speed_of_the_domain_is_none) {
-  ControlLoop loop(artifact(GetParam()), trajectory(), {});
+  ControlLoop loop(artifact(GetParam(), kDomainSpeed), trajectory(), {});
   for (std::int64_t seq = 0; seq < 300; ++seq) {
     RobotReading told = reading(seq, {kStart[0], kStart[1], kStart[2] - 2.0 * T * static_cast<double>(seq)});
     told.speed_rad_s = {0.0, 0.0, -2.0};
