@@ -93,7 +93,9 @@ def _area_sentence(areas: Areas) -> str:
 def _points_only(x: Axis, y: Axis, *, possible: bool) -> str:
     if possible:
         return "points only: nothing is proved between them (without --grid and --adaptive whole areas are)"
-    return f"points only: the data are not affine in {x.name} and {y.name}, nothing is proved between points"
+    return (
+        f"points only: the data are not shown to be affine in {x.name} and {y.name}, nothing is proved between points"
+    )
 
 
 def _write(region: Region, stem: Path, formats: Sequence[str]) -> list[Path]:

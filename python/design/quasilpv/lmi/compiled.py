@@ -242,7 +242,11 @@ class CompiledFamily:
         return self.coefficients.astype(np.int64)
 
 
-def compile_family(build: Callable[[Mapping[str, float]], Problem], base: Mapping[str, float]) -> CompiledFamily | None:
+def compile_family(
+    build: Callable[[Mapping[str, float]], Problem],
+    base: Mapping[str, float],
+    steps: Mapping[str, float] | None = None,
+) -> CompiledFamily | None:
     """Compile a family of problems, or None if its data are not affine in the parameters.
 
     The problem is built at the points of `lattice`, of which the first give the affine model. At all of them it is
@@ -251,19 +255,22 @@ def compile_family(build: Callable[[Mapping[str, float]], Problem], base: Mappin
     Args:
         build: the problem at a parameter point; always the same unknowns and inequalities in the same order.
         base: names of the parameters and a point.
+        steps: of the lattice, by name; 1 if they are not given.
     """
     names = tuple(base)
-    nodes = lattice(base)
+    nodes = lattice(base, steps)
     problem = build(base)
     tables = [_Coefficients.of(member) for member in (problem, *map(build, nodes[1:]))]
     places = np.unique(np.concatenate([table.places for table in tables]))
     denominator = lcm(*(table.denominator for table in tables))
     origin, *others = (table.spread(places, denominator) for table in tables)
     slopes = [row - origin for row in others[: len(names)]]
-    shift = [Fraction(base[name]) for name in names]
-    scale = lcm(1, *(value.denominator for value in shift))
+    inverse = [1 / Fraction(steps[name] if steps else 1) for name in names]
+    shift = [Fraction(base[name]) * per for name, per in zip(names, inverse, strict=True)]
+    scale = lcm(1, *(value.denominator for value in (*shift, *inverse)))
     constant = scale * origin - sum((int(scale * p) * row for p, row in zip(shift, slopes, strict=True)), 0)
-    coefficients = np.stack([constant, *(scale * row for row in slopes)])
+    levels = [int(scale * per) * row for per, row in zip(inverse, slopes, strict=True)]
+    coefficients = np.stack([constant, *levels])
     family = CompiledFamily(_layout(problem, places, coefficients), names, coefficients, denominator * scale)
     for node, row in zip(nodes, (origin, *others), strict=True):
         member = family.at(node)
@@ -283,15 +290,17 @@ def rounded(point: FloatArray) -> FloatArray:
     return np.asarray(np.ldexp(np.clip(steps, -most, most), exponent - CANDIDATE_BITS))
 
 
-def lattice(base: Mapping[str, float]) -> list[dict[str, float]]:
+def lattice(base: Mapping[str, float], steps: Mapping[str, float] | None = None) -> list[dict[str, float]]:
     """Points at which a polynomial of degree `DEGREE` is zero only if it is zero everywhere.
 
-    They are ``base + k`` for whole k >= 0 of sum `DEGREE` at most (principal lattice of a simplex, Nicolaides 1972), by
-    that sum: the base point, one step along every parameter, the others. Masses and frictions are bounded below only.
+    They are ``base + k``, k in steps (1 if none are given), for whole k >= 0 of sum `DEGREE` at most (principal
+    lattice of a simplex, Nicolaides 1972), by that sum: the base point, one step along every parameter, the others.
+    Masses and frictions are bounded below only.
     """
-    steps = [k for k in product(range(DEGREE + 1), repeat=len(base)) if sum(k) <= DEGREE]
-    steps.sort(key=lambda k: (sum(k), [-step for step in k]))
-    return [{name: base[name] + step for name, step in zip(base, k, strict=True)} for k in steps]
+    counts = [k for k in product(range(DEGREE + 1), repeat=len(base)) if sum(k) <= DEGREE]
+    counts.sort(key=lambda k: (sum(k), [-count for count in k]))
+    length = steps or dict.fromkeys(base, 1.0)
+    return [{name: base[name] + n * length[name] for name, n in zip(base, k, strict=True)} for k in counts]
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,6 +122,8 @@ class Sweep:
         known = condition(question.condition)
         left = {Reliance.INVERTIBLE_E, Reliance.INDEX_ONE} if self.swept else set()  # these may depend on the point
         refuse_refuted(known.id, [one for one in known.relies_on if one not in left], question.model())
+        fixed = {name: value for name, value in question.parameters}
+        self._own = system_kind(question.system).family(self.swept, **fixed)
         with limited(question.limits):
             self._family = self._compile()
 
@@ -146,7 +148,7 @@ class Sweep:
         if decision.feasible:
             finding = solution(decision, 1)
         else:
-            case = _case(self.question, compiled, lambda: self.question.at(point).model(), self._sketch(point))
+            case = _case(self.question, compiled, lambda: self._model(point), self._sketch(point))
             finding = examine(case, decision)
         refused = self._refused([point]) if finding.verdict is Verdict.FEASIBLE else None
         if refused is not None:
@@ -158,13 +160,13 @@ class Sweep:
         known = condition(self.question.condition)
         if not self.swept or Reliance.INVERTIBLE_E not in known.relies_on:
             return None
-        sketches = [self._sketch(point) or self.question.at(point).model() for point in points]
+        sketches = [self._sketch(point) or self._model(point) for point in points]
         if proof_of_invertibility(*(sketch.system for sketch in sketches)) is not None:
             return None
         if len({sketch.system.E.constant.tobytes() for sketch in sketches}) > 1:
             return "E(z) is not proved invertible between the points"
         try:
-            refuse_refuted(known.id, known.relies_on, self.question.at(points[0]).model())
+            refuse_refuted(known.id, known.relies_on, self._model(points[0]))
         except RefusedError as error:
             return error.got
         return None
@@ -226,13 +228,15 @@ class Sweep:
     @cached_property
     def _rescaled(self) -> CompiledFamily | None:
         """The family in those units."""
-        return compile_family(lambda point: self.question.at(point).inequalities(self._units).problem, self._base())
+        return self._compiled(self._units)
 
     def _sketch(self, point: Mapping[str, float]) -> PolytopicModel | None:
         """The system at a point, up to rounding, where it need not be built anew; the premises are those of all."""
         if self._family is None:
             return None
         (base, origin), *slopes = self._samples
+        if self._own is not None:
+            return PolytopicModel(self._own.at(point), origin.polytope)
         system = origin.system
         moved: dict[str, Any] = {}
         for name in "EABC":
@@ -250,6 +254,8 @@ class Sweep:
     def _samples(self) -> list[tuple[dict[str, float], PolytopicModel]]:
         """The system at a point, and one step further along every swept parameter."""
         base = self._base()
+        if self._own is not None:
+            return [(dict(self._own.base), self._model(self._own.base))]
         points = [base, *({**base, name: base[name] + 1.0} for name in self.swept)]
         return [(place, self.question.at(place).model()) for place in points]
 
@@ -259,9 +265,23 @@ class Sweep:
 
     def _compile(self) -> CompiledFamily | None:
         parameters = system_kind(self.question.system).parameters
-        if not self.swept or not all(parameters[name].affine for name in self.swept):
-            return None
-        return compile_family(lambda point: self.question.at(point).inequalities().problem, self._base())
+        affine = self._own is not None or all(parameters[name].affine for name in self.swept)
+        return self._compiled(None) if self.swept and affine else None
+
+    def _compiled(self, units: Units | None) -> CompiledFamily | None:
+        """The family of inequalities, in units if some are given."""
+        known, options = condition(self.question.condition), self.question.options
+        if self._own is None:
+            return compile_family(lambda point: self.question.at(point).inequalities(units).problem, self._base())
+        return compile_family(
+            lambda point: stated(known, self._model(point), options, units).problem, self._own.base, self._own.steps
+        )
+
+    def _model(self, point: Mapping[str, float]) -> PolytopicModel:
+        """The system at a point in the representation asked for; of a family of a user's, its member."""
+        if self._own is None:
+            return self.question.at(point).model()
+        return polytopic_model(self._own.at(point), self.question.representation)
 
 
 def answered(question: Question) -> Answer:

@@ -17,6 +17,7 @@ from quasilpv.errors import InputError
 from quasilpv.systems.affine_terms import PremiseBasis
 from quasilpv.systems.equations import Equilibrium, equation_matrices
 from quasilpv.systems.measured import with_kinds
+from quasilpv.systems.open_parameters import Made, open_parameters, opened
 from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
 from quasilpv.systems.premise_search import find_premises
 from quasilpv.systems.rules import affine_in_memberships, membership_premises, read_constant
@@ -148,6 +149,13 @@ class DescriptorSystem:
     ) -> DescriptorSystem:
         """The system of matrices whose entries have been read; state and domain are those of the names by default."""
         state, domain = state or names.state, names.domain if domain is None else domain
+        left_open = open_parameters()
+        if left_open is not None:
+            with opened(None):
+                closed = left_open.closed(matrices)
+                system = cls._of(names, closed, premises, state=state, domain=domain, disturbance=disturbance)
+            left_open.made.append(Made(system, matrices, premises, names.unknown))
+            return system
         if premises is None:
             premises, affine = find_premises(matrices, domain, names.unknown)
         else:

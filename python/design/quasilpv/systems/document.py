@@ -23,6 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.formula import parse_expression
+from quasilpv.systems.open_parameters import OpenParameters
 from quasilpv.systems.system_kind import Parameter, SystemKind
 from quasilpv.systems.vocabulary import exact, symbol
 
@@ -118,6 +119,9 @@ def _document_kind(path: Path, content: bytes) -> SystemKind:
     def build(**values: float) -> DescriptorSystem:
         return _system(document, str(path), {name: _decimal(value) for name, value in values.items()})
 
+    def left_open(record: OpenParameters, fixed: Mapping[str, float]) -> DescriptorSystem:
+        return _system(document, str(path), {n: _decimal(v) for n, v in fixed.items()} | dict(record.symbols))
+
     return SystemKind(
         id=str(path),
         summary=document.summary or f"{document.name}, {len(document.state)} states",
@@ -126,6 +130,7 @@ def _document_kind(path: Path, content: bytes) -> SystemKind:
         build=build,
         stem=path.stem,
         fingerprint=sha256(content).hexdigest(),
+        left_open=left_open,
     )
 
 
@@ -158,7 +163,7 @@ def _decimal(value: float) -> sp.Rational:
     return sp.Rational(repr(float(value)))
 
 
-def _system(document: SystemDocument, source: str, values: Mapping[str, sp.Rational]) -> DescriptorSystem:
+def _system(document: SystemDocument, source: str, values: Mapping[str, sp.Expr]) -> DescriptorSystem:
     """The system at values of its parameters, which stand in its formulas as the numbers they are."""
 
     def number(field: str, value: Value) -> sp.Expr:

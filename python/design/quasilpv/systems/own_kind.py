@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import count
@@ -14,6 +14,7 @@ import sympy as sp
 from quasilpv.errors import InputError
 from quasilpv.systems.catalogue import system_kind
 from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.open_parameters import OpenParameters
 from quasilpv.systems.system_kind import Parameter, SystemKind
 from quasilpv.systems.user_code import like_default, numeric_parameters
 
@@ -49,13 +50,15 @@ def own_kind(system: SystemLike) -> SystemKind:
         raise InputError("systems", "system", f"the {type(system).__name__} {system!r:.40}", expected)
     name = str(getattr(system, "__name__", type(system).__name__))
     parameters = numeric_parameters(system, name)
+    build = _Function(system, name, tuple((known, number.default) for known, number in parameters.items()))
     return SystemKind(
         id=name,
         summary=f"{name}, a function of {', '.join(parameters) or 'nothing'}",
         reference="this program",
         parameters={known: Parameter(float(number.default), "") for known, number in parameters.items()},
-        build=_Function(system, name, tuple((known, number.default) for known, number in parameters.items())),
+        build=build,
         fingerprint=f"{os.getpid()}-{next(_made)}",  # nobody can tell two functions of the same name apart later
+        left_open=build.left_open,
     )
 
 
@@ -97,3 +100,9 @@ class _Function:
         if not isinstance(made, DescriptorSystem):
             raise InputError(self.name, "result", f"the {type(made).__name__} {made!r:.40}", "a DescriptorSystem")
         return made
+
+    def left_open(self, record: OpenParameters, fixed: Mapping[str, float]) -> DescriptorSystem:
+        """What it makes with open numbers for some parameters."""
+        defaults = dict(self.defaults)
+        typed = {name: like_default(defaults[name], value) for name, value in fixed.items()}
+        return self.function(**typed, **record.numbers())

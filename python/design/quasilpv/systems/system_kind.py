@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from math import isfinite
 
 from quasilpv.errors import InputError
+from quasilpv.systems.affine_family import AffineFamily, affine_family
 from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.open_parameters import OpenParameters
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class SystemKind:
         parameters: its parameters by name.
         build: makes the system; called with every parameter by name.
         stem: the id as a part of a file name; the id itself if it is not given.
+        left_open: makes the system with some parameters left open and the others as given, where that can be tried
+            (`quasilpv.systems.affine_family`): what may be marked as affine by nobody is then found out.
         fingerprint: changes with what the system is made from, if that may change (a user's file); empty for the
             catalogue. Results kept for later hold it.
     """
@@ -50,6 +54,7 @@ class SystemKind:
     build: Callable[..., DescriptorSystem]
     stem: str = ""
     fingerprint: str = ""
+    left_open: Callable[[OpenParameters, Mapping[str, float]], DescriptorSystem] | None = None
 
     def __post_init__(self) -> None:
         """Take the id for a file name if no other is given."""
@@ -82,3 +87,21 @@ class SystemKind:
                 raise InputError(self.id, name, value, "a finite number")
         defaults = {name: parameter.default for name, parameter in self.parameters.items()}
         return self.build(**(defaults | {name: float(value) for name, value in parameters.items()}))
+
+    def family(self, swept: Collection[str], **parameters: float) -> AffineFamily | None:
+        """The systems over some parameters, proved to be affine in them; None if they are not shown to be.
+
+        Args:
+            swept: names of these parameters.
+            **parameters: values, defaults for the others; of the swept ones, where the family is centred.
+        """
+        if self.left_open is None or not swept:
+            return None
+        values = {name: parameter.default for name, parameter in self.parameters.items()} | parameters
+        fixed = {name: value for name, value in values.items() if name not in swept}
+        make = self.left_open
+        family = affine_family(lambda record: make(record, fixed), {name: float(values[name]) for name in swept})
+        if family is None:
+            return None
+        beside = {name: family.base[name] + family.steps[name] for name in family.base}
+        return family if family.holds(self.system(**fixed, **beside), beside) else None

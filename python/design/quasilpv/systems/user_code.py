@@ -10,7 +10,7 @@ import inspect
 import re
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from functools import lru_cache
 from hashlib import sha256
@@ -21,6 +21,7 @@ from typing import Any
 
 from quasilpv.errors import InputError, one_of
 from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.open_parameters import OpenParameters
 from quasilpv.systems.system_kind import Parameter, SystemKind
 
 ENTRY_POINT_GROUP = "quasilpv.systems"
@@ -171,6 +172,7 @@ def _kind(value: Any, kind_id: str, stem: str, source: str, fingerprint: str) ->
         build=_guarded(build, parameters, source),
         stem=stem,
         fingerprint=fingerprint,
+        left_open=_left_open(build, parameters, source),
     )
 
 
@@ -212,6 +214,20 @@ def _guarded(
         return made
 
     return guarded
+
+
+def _left_open(
+    build: Callable[..., Any], parameters: dict[str, Parameter], source: str
+) -> Callable[[OpenParameters, Mapping[str, float]], DescriptorSystem]:
+    """The function with open numbers for some parameters."""
+
+    def make(record: OpenParameters, fixed: Mapping[str, float]) -> DescriptorSystem:
+        typed = {name: like_default(parameters[name].default, value) for name, value in fixed.items()}
+        with _beside(source):
+            made: DescriptorSystem = build(**typed, **record.numbers())
+        return made
+
+    return make
 
 
 def like_default(default: float, value: float) -> float:

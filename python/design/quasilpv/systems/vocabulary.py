@@ -17,6 +17,7 @@ from sympy.core.function import AppliedUndef
 
 from quasilpv.errors import InputError, one_of
 from quasilpv.systems.formula import parse_equation, split_names
+from quasilpv.systems.open_parameters import OpenNumber, open_parameters
 
 Name: TypeAlias = "str | sp.Symbol | AppliedUndef"
 Formula: TypeAlias = "str | sp.Expr | sp.Eq | float"
@@ -120,7 +121,10 @@ class Vocabulary:
         """
         allowed = [*self.state, *self.parameters, *(self.inputs if inputs else ()), *self._constants]
         allowed += [rate(name) for name in self.state] if rates else []
-        if isinstance(formula, str):
+        left_open = open_parameters()
+        allowed += left_open.values if left_open else ()
+        if isinstance(formula, str):  # what has the factor 0 is written down all the same
+            self._mentioned |= {name for name in allowed if name.name in _IDENTIFIER.findall(formula)}
             expression = parse_equation(f"{self.source}: {field}", formula, {name.name: name for name in allowed})
         else:
             expression = self._canonical(field, formula)
@@ -178,7 +182,8 @@ class Vocabulary:
         """An expression in real symbols, rates for derivatives; left minus right side of an equation."""
         if isinstance(formula, sp.Eq):
             formula = formula.lhs - formula.rhs
-        expression = sp.sympify(formula, strict=True) if isinstance(formula, int | float) else formula
+        number = isinstance(formula, int | float | OpenNumber)
+        expression = sp.sympify(formula, strict=True) if number else formula
         if not isinstance(expression, sp.Expr):  # sympy evaluates an equation without unknowns to true or false
             raise InputError(self.source, field, expression, "an expression or an equation with unknowns")
         for derivative in expression.atoms(sp.Derivative):
