@@ -17,6 +17,7 @@ def solve_command(
 ) -> int:
     """Decide whether a condition holds for a system.
 
+    Of equations that are not feasible as they are factored first, other factorings of A(x) x are tried.
     The answer is one of four: feasible, proved; infeasible, proved; infeasible, numerically; unknown. Exit code 0 if
     feasible, 1 otherwise.
 
@@ -35,6 +36,7 @@ def solve_command(
                 "reason": answer.reason,
                 "relies_on": [reliance_document(one) for one in answer.relies_on],
                 "refutation": answer.refutation and answer.refutation.to_document(),
+                "factoring": answer.factoring,
                 "certified": answer.certified,
                 "margin": margin,
                 "unknowns": answer.unknowns,

@@ -48,6 +48,8 @@ class Answer:
             there is no such proof.
         relies_on: what a solution is worth nothing without, each proved, refuted or assumed; empty if it was not asked
             for.
+        factoring: the premises of the system a solution is for, as text, if that is another factoring of A(x) x; empty
+            if it is the one asked about.
         law: of a solution, if it was asked for and the condition gives one.
     """
 
@@ -62,6 +64,7 @@ class Answer:
     units: Units | None = None
     witness: tuple[float, ...] = ()
     relies_on: tuple[Relied, ...] = ()
+    factoring: str = ""
     law: Law | None = None
 
     @property
@@ -100,6 +103,7 @@ class Answer:
             "units": None if self.units is None else asdict(self.units),
             "witness": list(self.witness),
             "relies_on": [reliance_document(one) for one in self.relies_on],
+            "factoring": self.factoring,
         }
 
     @classmethod

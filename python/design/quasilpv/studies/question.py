@@ -27,7 +27,9 @@ from quasilpv.studies.affordable import require_affordable, within_limits
 from quasilpv.studies.answer import Answer, Verdict
 from quasilpv.studies.examination import Case, Finding, examine, is_small, no_solution, solution, stated
 from quasilpv.studies.law import Law
+from quasilpv.studies.other_factorings import with_other_factorings
 from quasilpv.systems.catalogue import system_kind
+from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.premise import AffineMatrix
 from quasilpv.systems.system_kind import SystemKind
 
@@ -287,16 +289,24 @@ class Sweep:
 def answered(question: Question) -> Answer:
     """Everything there is to say about one question, its law included.
 
+    Of a system from equations other factorings of A(x) x are tried where the first one is not feasible; the reason says
+    so, and the law has the premises of the one it was found with.
+
     Raises:
         InputError: the condition does not apply to the system, or the representation does not.
         TooLargeError: a solver would need more memory than it may have; names cheaper ways.
     """
-    return within_limits(question, lambda: _answered(question), alternatives=True)
+    first = within_limits(question, lambda: _answered(question, question.model()), alternatives=True)
+
+    def ask(other: DescriptorSystem) -> Answer:
+        return _answered(question, polytopic_model(other, question.representation))
+
+    return with_other_factorings(question.model().system, first, question.limits, ask)
 
 
-def _answered(question: Question) -> Answer:
+def _answered(question: Question, model: PolytopicModel) -> Answer:
     start = time.perf_counter()
-    known, model = condition(question.condition), question.model()
+    known = condition(question.condition)
     refuse_refuted(known.id, known.relies_on, model)
     statement = stated(known, model, question.options)
     compiled = CompiledProblem.of(statement.problem)
@@ -315,9 +325,9 @@ def largest_or_reached_margin(question: Question, answer: Answer) -> float | Non
     """How far a question is from the edge between feasible and infeasible; see `quasilpv.lmi.margin`.
 
     In the units of the answer, or those fitted first if it is not feasible: the margin depends on them. Of a problem
-    too large for the margin program, what the answer reached; None if it is not feasible.
+    too large for the margin program, or with another factoring, what the answer reached; None if it is not feasible.
     """
-    if not answer.unknowns or not is_small(answer.rows, answer.unknowns):
+    if not answer.unknowns or answer.factoring or not is_small(answer.rows, answer.unknowns):
         return answer.margin
     feasible = answer.verdict is Verdict.FEASIBLE
     units = answer.units if feasible else next(ladder(question.model().system))

@@ -53,6 +53,8 @@ class DescriptorSystem:
             whoever states one reports d.
         given_by_rules: the premises are the memberships of all rules but the last of a Takagi-Sugeno model: their
             sector coordinates sum to at most 1 (`from_rules`).
+        from_formulas: the drift was given as a function of the state, and A(x) is one way among others to write it as
+            A(x) x (`from_equations`).
 
     Raises:
         InputError: the shapes of the parts do not agree, or E has not the form diag(E_1(z), 0).
@@ -71,6 +73,7 @@ class DescriptorSystem:
     domain: Mapping[sp.Symbol, tuple[float, float]]
     disturbance: tuple[float, ...] = ()
     given_by_rules: bool = False
+    from_formulas: bool = False
 
     def __post_init__(self) -> None:
         """Refuse parts whose sizes disagree and states in another order than differential, algebraic."""
@@ -146,6 +149,7 @@ class DescriptorSystem:
         state: Sequence[sp.Symbol] = (),
         domain: Mapping[sp.Symbol, Bounds] | None = None,
         disturbance: tuple[float, ...] = (),
+        from_formulas: bool = False,
     ) -> DescriptorSystem:
         """The system of matrices whose entries have been read; state and domain are those of the names by default."""
         state, domain = state or names.state, names.domain if domain is None else domain
@@ -153,7 +157,15 @@ class DescriptorSystem:
         if left_open is not None:
             with opened(None):
                 closed = left_open.closed(matrices)
-                system = cls._of(names, closed, premises, state=state, domain=domain, disturbance=disturbance)
+                system = cls._of(
+                    names,
+                    closed,
+                    premises,
+                    state=state,
+                    domain=domain,
+                    disturbance=disturbance,
+                    from_formulas=from_formulas,
+                )
             left_open.made.append(Made(system, matrices, premises, names.unknown))
             return system
         if premises is None:
@@ -172,6 +184,7 @@ class DescriptorSystem:
             C=affine[3],
             domain=dict(domain),
             disturbance=disturbance,
+            from_formulas=from_formulas,
         )
 
     @classmethod
@@ -229,6 +242,7 @@ class DescriptorSystem:
             state=matrices.state,
             domain={each: _shifted(name, each, bounds, around) for each, bounds in names.domain.items()},
             disturbance=matrices.d if any(matrices.d) else (),
+            from_formulas=True,
         )
 
     @classmethod
