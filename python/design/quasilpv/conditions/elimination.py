@@ -144,12 +144,30 @@ def gains_on_extended(extended: FloatArray, inputs: FloatArray, lyapunov: FloatA
     Returns:
         M_i, (count, m, N).
     """
+    product = extended @ lyapunov
+    return _removing(product, inputs, float(np.abs(product).mean()))
+
+
+def compensated(
+    extended: FloatArray, inputs: FloatArray, before: FloatArray, after: FloatArray, gains: FloatArray
+) -> FloatArray:
+    """Gains that keep ``He(A_i P + B M_i)`` as it is while P changes to what `completed` makes of it.
+
+    Args:
+        extended, inputs: as in `gains_on_extended`.
+        before, after: P of the solution, and completed, (N, N).
+        gains: M_i of the solution, (count, m, N).
+    """
+    return np.asarray(gains + _removing(extended @ (after - before), inputs, 0.0))
+
+
+def _removing(product: FloatArray, inputs: FloatArray, own_size: float) -> FloatArray:
+    """M_i so that ``He(X_i + B M_i)`` is block diagonal in those coordinates, its own block ``-own_size I``."""
     acting, back = _independent(inputs)
     k = acting.shape[1]
     orthonormal, _ = np.linalg.qr(acting, mode="complete")
     basis = np.hstack([orthonormal[:, k:], acting @ np.linalg.inv(acting.T @ acting)])
-    product = extended @ lyapunov
     Q = basis.T @ (product + product.transpose(0, 2, 1)) @ basis
     free = len(basis) - k
-    own = -0.5 * (Q[:, free:, free:] + np.abs(product).mean() * np.eye(k))
+    own = -0.5 * (Q[:, free:, free:] + own_size * np.eye(k))
     return np.asarray(back @ np.concatenate([-Q[:, free:, :free], own], axis=2) @ np.linalg.inv(basis))

@@ -24,14 +24,19 @@ from quasilpv.conditions.condition import (
     shared_gains,
     vertex_sum,
 )
-from quasilpv.conditions.elimination import completed, gains_are_free, gains_on_extended, unactuated_rows
+from quasilpv.conditions.elimination import compensated, completed, gains_are_free, gains_on_extended, unactuated_rows
 from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, extended_states_in_double
 from quasilpv.conditions.gains import PolytopicGain
 from quasilpv.conditions.reliance import Reliance
 from quasilpv.conditions.slack import Slack
+from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.lmi.expressions import as_expression
 from quasilpv.polytopes import PolytopicModel
+
+_SINGULAR = 1e10
+"""Condition of a P that has no inverse to speak of."""
+_ROUNDING = 1e-6
 
 
 def inequalities(model: PolytopicModel, options: Options) -> Statement:
@@ -62,6 +67,9 @@ def inequalities(model: PolytopicModel, options: Options) -> Statement:
         value = P.at(values).astype(float)
         if free:
             return _recovered(model, options, values[P11], value)
+        if model.inputs and np.linalg.cond(value) > _SINGULAR:
+            gains = np.stack([values[each] for each in M])
+            return _completed(model, options, values[P11], value, gains)
         return Feedback(values[P11], polytopic_gain(model, M, values, np.linalg.inv(value)))
 
     return Statement(problem, feedback, slacks)
@@ -74,6 +82,27 @@ def _recovered(model: PolytopicModel, options: Options, lyapunov: FloatArray, P:
     M = gains_on_extended(extended, extended_inputs(model)[0].astype(float), whole)
     K = M @ np.linalg.inv(whole)
     return Feedback(lyapunov, PolytopicGain(model.polytope, K))
+
+
+def _completed(
+    model: PolytopicModel, options: Options, lyapunov: FloatArray, P: FloatArray, gains: FloatArray
+) -> Feedback:
+    """The law of a solution whose P is singular: where B is constant, P sees of ``Z B`` no more than the gains do.
+
+    Raises:
+        InputError: what unknown premises multiply in E, A_12 or A_22 would have to be compensated by gains that know
+            them.
+    """
+    if model.constant_input:
+        whole = completed(P, model)
+        extended = extended_states_in_double(model, options.decay_rate)
+        kept = compensated(extended, extended_inputs(model)[0].astype(float), P, whole, gains)
+        shared = list(model.polytope.shared_gain)
+        if np.allclose(kept, kept[shared], rtol=_ROUNDING, atol=_ROUNDING * float(np.abs(kept).max())):
+            law = PolytopicGain(model.polytope, kept[shared] @ np.linalg.inv(whole))
+            return Feedback(lyapunov, law)
+    got = "a solution whose Lyapunov matrix P is singular"
+    raise InputError("condition I.53", model.system.name, got, "one that has a law K = M P^-1: another representation")
 
 
 CONDITION = Condition(

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 ALTERNATIVE_S = 6.0
 """What writing an alternative down may take; one that takes longer is none."""
 
+ALTERNATIVES_S = 10.0
+"""What writing down all of them may take, those that take too long included: whoever asks has waited already."""
+
 MOST_ALTERNATIVES = 3
 
 SPARE = 0.5
@@ -75,10 +78,12 @@ def require_affordable(question: Question, layout: Layout) -> None:
 def ways(question: Question) -> str:
     """Cheaper ways to ask a question, smallest first, with their sizes."""
     found: list[tuple[Size, str]] = []
-    for words, other in _others(question):
-        size = _size(other)
-        if size is not None and size.memory_gib <= SPARE * (question.limits.memory_gib or budget.DEFAULT_MEMORY_GIB):
-            found.append((size, words))
+    with budget.limited(Limits(ALTERNATIVES_S)):
+        for words, other in _others(question):
+            size = _size(other)
+            allowed = question.limits.memory_gib or budget.DEFAULT_MEMORY_GIB
+            if size is not None and size.memory_gib <= SPARE * allowed:
+                found.append((size, words))
     if not found:
         return "no cheaper way of asking was found: fewer premises or a smaller system"
     found.sort(key=lambda pair: pair[0].memory_gib, reverse=True)
