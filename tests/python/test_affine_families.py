@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import quasilpv as ql
+from quasilpv.errors import InputError
 from quasilpv.lmi.compiled import lattice
 from quasilpv.systems.catalogue import system_kind
 from quasilpv.systems.own_kind import own_kind
@@ -171,3 +172,39 @@ def test_code_in_a_file_is_asked_too(tmp_path: Path) -> None:
     kind = system_kind(f"{path}:plant")
     assert kind.family(["k", "c"]) is not None
     assert kind.family(["k", "n"]) is None  # a range needs a number
+
+
+def driven(a: float = 1.0, b: float = 1.0) -> ql.DescriptorSystem:
+    return ql.DescriptorSystem.from_equations(
+        [f"x' = y + {a}*x", f"y' = x*cos(x) + {b}*u"], state="x y", inputs="u", domain={"x": (-1, 1)}
+    )
+
+
+@pytest.mark.parametrize("condition", ["I.2", "I.53", "II.6-direct", "TS-Pj", "guerra-2007", "sampled-feedback"])
+def test_no_area_is_proved_where_the_input_vanishes(condition: str) -> None:
+    """With b = 0 nothing stabilises ``y' = x cos x``: forms without gains must not see the rank of B only beside it."""
+    found = ql.region(driven, condition, ("a", -2.0, 2.0, 3), ("b", -1.0, 1.0, 5), representation="ts")
+    assert all(r.y[0] > 0.0 or r.y[1] < 0.0 for r in (found.areas.proved if found.areas else ()))
+    assert all(p.answer.headline == "infeasible, proved" for p in found.points if p.y == 0.0)
+    alone = ql.region(driven, condition, ("a", -2.0, 2.0, 3), ("b", -1.0, 1.0, 5), representation="ts", grid=True)
+    assert {p.answer.certified for p in alone.points if p.y == 0.0} == {False}
+    assert {p.answer.certified for p in alone.points if p.y != 0.0} == {True}
+
+
+def resistive(L: float = 0.01, k: float = 0.5) -> ql.DescriptorSystem:
+    """At L = 0 the current is algebraic and ``v' = -(10 + k) v``, which is stable."""
+    return ql.DescriptorSystem.from_equations([f"{L}*i' = -i/10 - v", f"v' = i - {k}*v"], state="i v", domain={})
+
+
+def test_a_point_where_a_state_loses_its_rate_is_another_system() -> None:
+    found = ql.region(resistive, "I.1", ("k", 0.0, 1.0, 3), ("L", 0.0, 0.01, 3), grid=True)
+    assert [p.answer.headline for p in found.points if p.y == 0.0] == ["feasible, proved"] * 3
+
+
+@pytest.mark.parametrize(("equation", "domain"), [("x' = x/R + w*x", [-1, 1]), ("x' = R*x + w*x", [-1, "1/R"])])
+def test_a_formula_without_a_value_is_one_line(tmp_path: Path, equation: str, domain: list[float | str]) -> None:
+    document = {"schema": "quasilpv.system", "schema_version": 1, "name": "s", "state": ["x"], "parameters": {"R": 1.0}}
+    path = tmp_path / "divided.json"
+    path.write_text(json.dumps({**document, "equations": [equation], "domain": {"w": domain}}))
+    with pytest.raises(InputError, match=r"values for which|undefined"):
+        ql.solve(str(path), "I.1", parameters={"R": 0.0})

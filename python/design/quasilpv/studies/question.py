@@ -11,16 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from quasilpv.conditions.condition import Options, Statement
+from quasilpv.conditions.condition import Form, Options, Statement
 from quasilpv.conditions.invertibility import proof_of_invertibility
 from quasilpv.conditions.registry import condition
 from quasilpv.conditions.reliance import RefusedError, Reliance, refuse_refuted
+from quasilpv.errors import InputError
 from quasilpv.lmi import largest_margin
 from quasilpv.lmi.budget import Limits, limited
 from quasilpv.lmi.common import common_problem
 from quasilpv.lmi.compiled import CompiledFamily, CompiledProblem, compile_family
 from quasilpv.lmi.feasibility import decide
-from quasilpv.polytopes import PolytopicModel, polytopic_model
+from quasilpv.polytopes import BlockPolytope, PolytopicModel, polytopic_model
 from quasilpv.polytopes.scaling import ladder
 from quasilpv.polytopes.units import Units
 from quasilpv.studies.affordable import require_affordable, within_limits
@@ -28,10 +29,16 @@ from quasilpv.studies.answer import Answer, Verdict
 from quasilpv.studies.examination import Case, Finding, examine, is_small, no_solution, solution, stated
 from quasilpv.studies.law import Law
 from quasilpv.studies.other_factorings import with_other_factorings
+from quasilpv.studies.refutation import IMPLIED
 from quasilpv.systems.catalogue import system_kind
 from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.premise import AffineMatrix
 from quasilpv.systems.system_kind import SystemKind
+
+_POLYNOMIAL = frozenset(IMPLIED) - {"I.3"}
+"""Conditions whose inequalities, as published, are polynomials in E, A and B: no norms, pivots or ranks of them."""
+
+_INPUTS = 2  # of E, A, B
 
 
 @dataclass(frozen=True)
@@ -125,7 +132,8 @@ class Sweep:
         left = {Reliance.INVERTIBLE_E, Reliance.INDEX_ONE} if self.swept else set()  # these may depend on the point
         refuse_refuted(known.id, [one for one in known.relies_on if one not in left], question.model())
         fixed = {name: value for name, value in question.parameters}
-        self._own = system_kind(question.system).family(self.swept, **fixed)
+        own = system_kind(question.system).family(self.swept, **fixed) if known.id in _POLYNOMIAL else None
+        self._own = own
         with limited(question.limits):
             self._family = self._compile()
 
@@ -214,7 +222,8 @@ class Sweep:
     def _problem(self, points: Sequence[Mapping[str, float]], units: Units | None = None) -> CompiledProblem:
         """The inequalities at all these points, in one set of unknowns."""
         places = [{name: point[name] for name in self.swept} for point in points]
-        if self._family is not None and units is None:
+        another = self._own is not None and len(places) == 1 and not self._is_member(places[0])
+        if self._family is not None and units is None and not another:
             return common_problem(self._family, places)
         if len(points) == 1:
             return CompiledProblem.of(self.question.at(places[0]).inequalities(units).problem)
@@ -238,7 +247,7 @@ class Sweep:
             return None
         (base, origin), *slopes = self._samples
         if self._own is not None:
-            return PolytopicModel(self._own.at(point), origin.polytope)
+            return self._member(point, origin.polytope)
         system = origin.system
         moved: dict[str, Any] = {}
         for name in "EABC":
@@ -275,15 +284,33 @@ class Sweep:
         known, options = condition(self.question.condition), self.question.options
         if self._own is None:
             return compile_family(lambda point: self.question.at(point).inequalities(units).problem, self._base())
+        if any(slopes[_INPUTS].any() for slopes in self._own.slopes.values()):
+            options = replace(options, form=Form.PUBLISHED)  # reduced ones look at the null space of B, which may jump
         return compile_family(
             lambda point: stated(known, self._model(point), options, units).problem, self._own.base, self._own.steps
         )
 
     def _model(self, point: Mapping[str, float]) -> PolytopicModel:
         """The system at a point in the representation asked for; of a family of a user's, its member."""
+        if self._own is not None and (found := self._member(point)) is not None:
+            return found
+        return self.question.at(point).model()
+
+    def _is_member(self, point: Mapping[str, float]) -> bool:
+        """Whether the system at a point has the states and the algebraic equations of the user's family."""
+        return self._member(point, self._samples[0][1].polytope) is not None
+
+    def _member(self, point: Mapping[str, float], polytope: BlockPolytope | None = None) -> PolytopicModel | None:
+        """The system of the user's family; None where it is another one there: a state without a rate at L = 0."""
         if self._own is None:
-            return self.question.at(point).model()
-        return polytopic_model(self._own.at(point), self.question.representation)
+            return None
+        try:
+            member = self._own.at(point)
+        except InputError:
+            return None
+        if polytope is not None:
+            return PolytopicModel(member, polytope)
+        return polytopic_model(member, self.question.representation)
 
 
 def answered(question: Question) -> Answer:

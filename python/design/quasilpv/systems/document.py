@@ -170,9 +170,11 @@ def _system(document: SystemDocument, source: str, values: Mapping[str, sp.Expr]
         if not isinstance(value, str):
             return _decimal(value)
         names = {name: symbol(name) for name in values}
-        return exact(parse_expression(f"{source}: {field}", value, names)).subs(
-            {names[n]: v for n, v in values.items()}
-        )
+        formula = exact(parse_expression(f"{source}: {field}", value, names))
+        result = formula.subs({names[n]: v for n, v in values.items()})
+        if result.has(sp.zoo, sp.nan):
+            raise InputError(source, field, result, "a value: the parameters make it undefined")
+        return result
 
     around = document.equilibrium or EquilibriumEntry()
     values_of = [

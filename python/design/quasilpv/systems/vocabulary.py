@@ -128,11 +128,23 @@ class Vocabulary:
             expression = parse_equation(f"{self.source}: {field}", formula, {name.name: name for name in allowed})
         else:
             expression = self._canonical(field, formula)
-        expression = expression.xreplace(self._constants)
+        expression = self._with_constants(field, expression)
         self._mentioned |= expression.free_symbols
         for stranger in sorted(expression.free_symbols - set(allowed), key=str):
             self._refuse_stranger(field, stranger, allowed)
         return expression
+
+    def _with_constants(self, field: str, expression: sp.Expr) -> sp.Expr:
+        """An expression with the numbers that names stand for.
+
+        Raises:
+            InputError: it has no value for them: 1/R at R = 0.
+        """
+        replaced = expression.xreplace(self._constants)
+        if replaced.has(sp.zoo, sp.nan, sp.oo, -sp.oo):
+            values = ", ".join(f"{name} = {value}" for name, value in self._constants.items() if expression.has(name))
+            raise InputError(self.source, field, values or replaced, "values for which the formula is defined")
+        return replaced
 
     def read_matrix(self, field: str, matrix: SymbolicMatrix) -> sp.Matrix:
         """A matrix whose entries are read as formulas of states and parameters. Errors: `read`."""
