@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 from numpy.testing import assert_allclose
 
-from quasilpv.errors import InputError
+from quasilpv.errors import MOST_NAMES, InputError
 from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.equations import rate
 from quasilpv.systems.premise import Premise, PremiseKind
@@ -282,3 +282,11 @@ def test_a_system_travels_between_processes() -> None:
     model = build()
     model.premise_values([0.5, 1.0], {"P": 1.0})  # compiles
     assert_same(pickle.loads(pickle.dumps(model)), model)
+
+
+def test_a_stranger_among_many_names_is_looked_for_in_the_system() -> None:
+    """Names of a system are in no listing of the command line."""
+    names = [f"x{k}" for k in range(MOST_NAMES + 1)]
+    with pytest.raises(InputError, match="or another of the system") as caught:
+        DescriptorSystem.from_equations([f"{name}' = -{name} + x99" for name in names], state=names, domain={})
+    assert "design list" not in str(caught.value)

@@ -39,17 +39,18 @@ class InputError(QuasilpvError):
         return type(self), (self.source, self.field, self.got, self.expected)
 
 
-def one_of(names: Iterable[str], got: str) -> str:
+def one_of(names: Iterable[str], got: str, listed_by: str = "design list") -> str:
     """What was expected where a name is unknown: the names there are, and the one that was probably meant.
 
     Args:
         names: those known; of more than `MOST_NAMES` only the closest are printed.
         got: the unknown one.
+        listed_by: where all of them are to be seen.
     """
     known = list(names)
     close = get_close_matches(got, known, n=3)
     if len(known) > MOST_NAMES:
-        return f"{', '.join([*close, 'one' if not close else 'or another'])} of design list"
+        return f"{', '.join([*close, 'one' if not close else 'or another'])} of {listed_by}"
     listed = f"one of {', '.join(known)}"
     return f"{listed}; did you mean {close[0]}?" if close else listed
 

@@ -226,7 +226,7 @@ class _Parser:
         if token.text == "piecewise":
             return self._piecewise(token)
         if token.text not in FUNCTIONS:
-            self._refuse(token, f"a function: {one_of([*FUNCTIONS, 'piecewise', 'rate'], token.text)}")
+            self._refuse(token, f"a function: {one_of([*FUNCTIONS, 'piecewise', 'rate'], token.text, 'the grammar')}")
         arguments = [self._sum()]
         while self._accept(","):
             arguments.append(self._sum())
@@ -258,7 +258,10 @@ class _Parser:
             return self._symbols[name]
         if name == "pi":
             return sp.pi
-        self._refuse(token, f"a name that is declared: {one_of(self._symbols, name) if self._symbols else 'none is'}")
+        self._refuse(
+            token,
+            f"a name that is declared: {one_of(self._symbols, name, 'the system') if self._symbols else 'none is'}",
+        )
 
     def _number(self, token: _Token) -> sp.Rational:
         mantissa, _, exponent = token.text.lower().partition("e")

@@ -68,7 +68,9 @@ def _file_kind(path: Path, name: str, source: bytes) -> SystemKind:
     module = _executed(path, source)
     if not hasattr(module, name):
         names = [n for n, value in vars(module).items() if _may_be_a_system(value, module)]
-        raise InputError(str(path), "name", name, one_of(names, name) if names else "the name of a system of the file")
+        raise InputError(
+            str(path), "name", name, one_of(names, name, "the file") if names else "the name of a system of the file"
+        )
     kind_id = f"{path}:{name}"
     return _kind(getattr(module, name), kind_id, f"{path.stem}-{name}", str(path), sha256(source).hexdigest())
 

@@ -162,14 +162,13 @@ class Vocabulary:
         """A symbol that is not declared, or not allowed here."""
         if stranger.name.endswith("'"):
             known = [name.name for name in allowed if name.name.endswith("'")]
-            expected = f"a rate of a state, {one_of(known, str(stranger))}"
+            expected = f"a rate of a state, {one_of(known, str(stranger), 'the system')}"
             raise InputError(self.source, field, f"the rate {stranger}", expected)
         if stranger in self.inputs:
             raise InputError(self.source, field, f"the input {stranger}", "no input")
         names = [name.name for name in allowed if not name.name.endswith("'")]
-        expected = (
-            f"a name that is declared (a parameter by its interval in the domain), {one_of(names, stranger.name)}"
-        )
+        known = one_of(names, stranger.name, "the system")
+        expected = f"a name that is declared (a parameter by its interval in the domain), {known}"
         raise InputError(self.source, field, stranger, expected)
 
     def finish(self) -> None:
@@ -182,7 +181,7 @@ class Vocabulary:
         for field, declared in (("domain", self.domain), ("unknown", self.unknown)):
             for name in declared:
                 if name not in self._mentioned:
-                    expected = f"a name that occurs, {one_of(names, name.name)}"
+                    expected = f"a name that occurs, {one_of(names, name.name, 'the system')}"
                     raise InputError(self.source, field, f"{name}, which occurs nowhere", expected)
         for name in self.unknown:
             if name in self.state or name in self.inputs:
