@@ -167,8 +167,8 @@ class Vocabulary:
         if stranger in self.inputs:
             raise InputError(self.source, field, f"the input {stranger}", "no input")
         names = [name.name for name in allowed if not name.name.endswith("'")]
-        known = one_of(names, stranger.name, "the system")
-        expected = f"a name that is declared (a parameter by its interval in the domain), {known}"
+        close = one_of(names, stranger.name, "the system")
+        expected = f"a name that is declared (a parameter by its interval in the domain), {close}"
         raise InputError(self.source, field, stranger, expected)
 
     def finish(self) -> None:
