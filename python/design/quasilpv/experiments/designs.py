@@ -30,6 +30,7 @@ _DESIGN_ROOMS = (
     "synthesis",
     "certificate",
     "artifact",
+    "files",
     "release.py",
 )
 
