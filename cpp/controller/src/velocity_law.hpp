@@ -32,7 +32,7 @@ class VelocityLaw : public ControlLaw {
     const ModelSample<N> model = sample_model<N>(model_, sample.angle, report);
     Command<N> command = control(sample, model, report);
     if (input.joining && !feeds_forward()) {
-      command.torque += torque_of(input.offset, sample.angle, model);
+      command.torque += holding_torque(input.offset, sample.angle, model);
     }
     to_array<N>(command.torque, report.torque_commanded);
     report.flags |= limiter_.apply(report.torque_commanded, input.commanded, report.torque_applied);
@@ -79,13 +79,15 @@ class VelocityLaw : public ControlLaw {
   /// The torque that acts is in the report.
   virtual void applied(const Sample& /*sample*/, const ModelSample<N>& /*model*/, StepReport& /*report*/) noexcept {}
 
-  /// What a reference that is off its path by `offset` asks for beside the law of a reference on it:
-  /// M(y) offset'' + G(y) - G(y - offset). So a law that lives from feedback alone is no worse off while a start joins.
-  JointVector<N> torque_of(const Reference& offset, const JointVector<N>& y, const ModelSample<N>& model) noexcept {
+  /// What holds the arm `offset` beside the path, for a law whose own torque is for the path: G(y) - G(y - offset). The
+  /// inertia of the offset is not fed forward: a law that lives from feedback alone is slow, so that on a plant much
+  /// lighter than its model nobody would take back what that is too much.
+  JointVector<N> holding_torque(const Reference& offset, const JointVector<N>& y,
+                                const ModelSample<N>& model) noexcept {
     const JointVector<N> on_path = y - from_array<N>(offset.angle);
     JointVector<N> gravity;
     model_.gravity.evaluate(ProgramInput{on_path.data()}, gravity.data());
-    return model.inertia * from_array<N>(offset.acceleration) + model.gravity - gravity;
+    return model.gravity - gravity;
   }
 
   DesignModel model_;

@@ -108,12 +108,12 @@ class _Run:
         self.session.advance(torque)
 
     def follow(self, loop: _runtime.ControlLoop, until: int) -> FloatArray:
-        """Under a loop to a sample; the largest speed of each joint on the way."""
-        largest = np.abs(self.session.speed)
+        """Under a loop to a sample; the speeds from here to there, magnitudes, (samples + 1, n)."""
+        speeds = [np.abs(self.session.speed)]
         while self.session.seq < until:
             self.advance(self.controlled(loop))
-            largest = np.maximum(largest, np.abs(self.session.speed))
-        return largest
+            speeds.append(np.abs(self.session.speed))
+        return np.array(speeds)
 
     def own_torque(self) -> FloatArray:
         """What the law begins with where the arm is, without an error: at rest, with the reference's acceleration."""
@@ -124,30 +124,28 @@ class _Run:
         return law.step(angle, angle, np.zeros(n), acceleration, np.zeros(n)).torque_applied[:n]
 
 
-def start(
-    artifact: Artifact, trajectory: Trajectory, scenario: Scenario, kind: Start, *, at_s: float = 0.5
-) -> StartOutcome:
+def start(artifact: Artifact, trajectory: Trajectory, scenario: Scenario, kind: Start) -> StartOutcome:
     """Start a controller and compare its motion with that of the undisturbed run.
 
     Args:
         artifact: the controller.
         trajectory: the reference.
-        scenario: the plant, which begins on the reference; `Start.BESIDE` moves it.
-        kind: of start.
-        at_s: when a restart or a fault interrupts the run.
+        scenario: the plant and how it begins; `Start.BESIDE` moves it. Its disturbances are those of both runs.
+        kind: of start. A restart or a fault interrupts the run when the undisturbed one is fastest.
 
     Raises:
         ClaimError: the controller does not start.
     """
     undisturbed = _Run.of(artifact, trajectory, scenario)
     samples = undisturbed.session.samples
-    usual = undisturbed.follow(undisturbed.loop(bumpless=False), samples)
+    speeds = undisturbed.follow(undisturbed.loop(bumpless=False), samples)
+    usual = speeds.max(axis=0)
     if kind is Start.BESIDE:
         beside = {"angle_rad": tuple(np.array(scenario.initial.angle_rad) + _beside(artifact, scenario))}
         beside["speed_rad_s"] = (0.0,) * artifact.joints
         scenario = scenario.model_copy(update={"initial": scenario.initial.model_copy(update=beside)})
     run = _Run.of(artifact, trajectory, scenario)
-    interrupted = round(at_s / artifact.sample_period_s)
+    interrupted = _fastest(speeds, artifact)
     loop = run.loop()
     if kind is Start.RESTART:
         run.follow(run.loop(), interrupted)
@@ -161,7 +159,7 @@ def start(
         raise ClaimError(f"{artifact.name}: {kind}: {loop.refusal}")
     run.advance(first)
     joining = joining_speed(artifact, *_offset(run))
-    speed = run.follow(loop, samples)
+    speed = run.follow(loop, samples).max(axis=0)
     if loop.state == "fault":
         raise ClaimError(f"{artifact.name}: {kind}: {loop.cause}")
     return StartOutcome(
@@ -206,6 +204,13 @@ def joining_speed(artifact: Artifact, offset: FloatArray, speed: FloatArray) -> 
     time = np.linspace(0.0, duration, 1001)[:, None]
     rate = (powers[1:] * time ** (powers[1:] - 1)) @ coefficients[1:]
     return np.asarray(np.abs(rate).max(axis=0))
+
+
+def _fastest(speeds: FloatArray, artifact: Artifact) -> int:
+    """The sample with the largest share of a domain's speed, not so late that nothing follows nor before a start."""
+    share = (speeds / np.abs(artifact.domain.speed_rad_s).max(axis=1)).max(axis=1)
+    early, late = round(2 * INTERRUPTION_S / artifact.sample_period_s), round(0.9 * len(speeds))
+    return early + int(np.argmax(share[early:late]))
 
 
 def _beside(artifact: Artifact, scenario: Scenario) -> FloatArray:
