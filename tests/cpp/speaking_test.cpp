@@ -117,6 +117,32 @@ TEST_P(InARun, F23_an_end_of_the_plant_counts_unless_it_is_older_than_what_it_me
   EXPECT_TRUE(controller_.take(event));
 }
 
+// Of all that a controller could say before its first command, only that it started, or refuses to start here, counts.
+TEST(BeforeARun, F19_the_plant_hears_a_refusal_that_is_meant_for_it_and_nothing_else) {
+  const auto ends = InProcessLink::create_pair(kIdentity);
+  InProcessLink& plant = *ends.second;
+  std::int64_t unfit = 0;
+  for (const std::int64_t receiver : {std::int64_t{0}, kStranger, plant.sender()}) {
+    for (std::int32_t code = 2; code <= 4; ++code) {
+      for (const FaultCause cause : {FaultCause::kNone, FaultCause::kStopRequested, FaultCause::kStartRefused}) {
+        event_v2 event{};
+        event.sender = ends.first->sender();
+        event.receiver = receiver;
+        event.source = static_cast<std::int32_t>(Side::kController);
+        event.code = code;
+        event.detail[0] = static_cast<std::int64_t>(cause);
+        const Packet packet = packet_of(event, false);
+        plant.inject(Channel::kEvent, packet.bytes.data(), static_cast<std::size_t>(packet.size));
+        plant.receive(0);
+        const bool counts = receiver == plant.sender() && code == static_cast<std::int32_t>(EventCode::kEnded) &&
+                            cause == FaultCause::kStartRefused;
+        EXPECT_EQ(plant.take(event), counts) << receiver << ' ' << code << ' ' << to_string(cause);
+        EXPECT_EQ(plant.counters().unfit_events, unfit += counts ? 0 : 1);
+      }
+    }
+  }
+}
+
 TEST_P(InARun, F22_a_measurement_of_a_second_plant_never_reaches_the_law_and_is_a_fault_once_the_first_goes_on) {
   LinkRobot robot(controller_);
   measurement_v2 other{};

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from types import ModuleType
 
 import numpy as np
 import pytest
 
 from quasilpv.artifact import read_artifact
-from quasilpv.scenarios import read_scenario
+from quasilpv.scenarios import read_scenario, write_scenario
 from two_processes import Experiment, WirePlant, finish
 
 pytest_plugins = ["two_processes"]
@@ -42,6 +43,27 @@ def test_F19_when_an_encoder_is_turns_off_at_the_start_expect_exit_3_one_line_an
     (line,) = errors.splitlines()
     for part in (f"angle_rad[{joint}]", f"{off[joint]:.3f}"[:-1], f"{low:g}", f"{high:g}"):
         assert part in line
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_F19_when_the_controller_refuses_to_start_expect_the_plant_to_end_at_once_with_one_line(
+    experiment: Experiment, rest: np.ndarray, mode: str
+) -> None:
+    path = experiment.folder / "scenario.json"
+    scenario = read_scenario(path)
+    turned = scenario.initial.model_copy(update={"angle_rad": tuple(rest + np.array([0.0, TURN, 0.0]))})
+    write_scenario(path, scenario.model_copy(update={"initial": turned}))
+    timeout_s = 40.0
+    begun_s = time.monotonic()
+    options = ("--mode", mode, "--timeout-s", f"{timeout_s:g}")
+    controller = experiment.start(experiment.controller_command(*options))
+    plant = experiment.start(experiment.simulator_command(*options))
+    code, report, errors = finish(plant)
+    assert time.monotonic() - begun_s < timeout_s / 2
+    assert (code, report["end"], report["samples"]) == (3, "start refused by the controller", 0)
+    assert [line for line in errors.splitlines() if "warning" not in line] == [errors.splitlines()[-1]]
+    assert "start refused by the controller" in errors
+    assert finish(controller)[0] == 3
 
 
 def test_F20_when_one_measurement_is_a_turn_off_expect_it_predicted_and_when_they_last_a_fault_at_the_20th(

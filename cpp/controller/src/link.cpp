@@ -199,7 +199,10 @@ bool Link::fits(const event_v2& event) noexcept {
 bool Link::fits(const event_v2& event, std::int64_t newest_seq) noexcept {
   const auto code = static_cast<EventCode>(event.code);
   if (!peers_.has_peer()) {
-    return peers_.fits(speaker_of(event)) && code == EventCode::kStarted;
+    // A controller that refuses to start says so to the plant it has heard, before any command.
+    const bool refuses = code == EventCode::kEnded && event.receiver == sender_ &&
+                         event.detail[0] == static_cast<std::int64_t>(FaultCause::kStartRefused);
+    return peers_.fits(speaker_of(event)) && (code == EventCode::kStarted || refuses);
   }
   return peers_.is_peer(event.sender) && code != EventCode::kReset &&
          (code != EventCode::kEnded || event.seq >= newest_seq);

@@ -151,15 +151,26 @@ class PlantRun {
       end_ = PlantRunEnd::kStopped;
     } else if (const Conflict conflict = link_.peers().take_conflict(); conflict != Conflict::kNone) {
       end_ = end_by(conflict);
-    } else if (link_.take(event) && event.code == static_cast<std::int32_t>(EventCode::kEnded) &&
-               settings_.pace == Pace::kLockStep) {
-      end_ = PlantRunEnd::kControllerEnded;
-    } else if (monotonic_ns() - last_heard_ns_ > timeout_ns_) {
+    } else if (link_.take(event) && event.code == static_cast<std::int32_t>(EventCode::kEnded)) {
+      end_ = end_by(event);
+    }
+    if (end_) {
+      return true;
+    }
+    if (monotonic_ns() - last_heard_ns_ > timeout_ns_) {
       end_ = report_.refused_commands > 0 ? PlantRunEnd::kCommandsRefused
              : last_command_seq_ < 0      ? PlantRunEnd::kControllerNeverHeard
                                           : PlantRunEnd::kControllerSilent;
     }
     return end_.has_value();
+  }
+
+  /// In real time another controller may follow one that leaves, but none will start where one has refused to.
+  std::optional<PlantRunEnd> end_by(const event_v2& ended) const noexcept {
+    if (last_command_seq_ < 0 && ended.detail[0] == static_cast<std::int64_t>(FaultCause::kStartRefused)) {
+      return PlantRunEnd::kStartRefused;
+    }
+    return settings_.pace == Pace::kLockStep ? std::optional(PlantRunEnd::kControllerEnded) : std::nullopt;
   }
 
   static PlantRunEnd end_by(Conflict conflict) noexcept {
@@ -303,6 +314,8 @@ const char* to_string(PlantRunEnd end) noexcept {
       return "stopped";
     case PlantRunEnd::kControllerEnded:
       return "controller ended";
+    case PlantRunEnd::kStartRefused:
+      return "start refused by the controller";
     case PlantRunEnd::kControllerSilent:
       return "controller silent";
     case PlantRunEnd::kCommandsRefused:

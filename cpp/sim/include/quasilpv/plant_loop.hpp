@@ -29,6 +29,7 @@ enum class PlantRunEnd {
   kCompleted,
   kStopped,               ///< SIGINT or SIGTERM
   kControllerEnded,       ///< lock-step: the controller said it leaves
+  kStartRefused,          ///< the controller does not start where the plant begins, and said so
   kControllerSilent,      ///< no command for `timeout_s`
   kCommandsRefused,       ///< commands, but for `timeout_s` none that may act
   kControllerNeverHeard,  ///< no command at all

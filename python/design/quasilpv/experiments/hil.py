@@ -266,9 +266,9 @@ def _run_both(commands: dict[str, list[str]], limit_s: float) -> tuple[dict[str,
             if time.monotonic() > deadline:
                 raise TransportError(f"{' and '.join(commands)}: still running after {limit_s:g} s")
             time.sleep(POLL_S)
+        _raise_refused_start(processes[CONTROLLER])
         for name, process in processes.items():
             if process.returncode not in (None, 0, EXIT_FAULT_STOP):
-                _raise_refused_start(processes[CONTROLLER])
                 _raise_failure(name, process)
         said = {name: process.communicate() for name, process in processes.items()}
         stopped = [name for name, process in processes.items() if process.returncode == EXIT_FAULT_STOP]
@@ -282,7 +282,7 @@ def _run_both(commands: dict[str, list[str]], limit_s: float) -> tuple[dict[str,
 
 
 def _raise_refused_start(controller: subprocess.Popen[str]) -> None:
-    """Raise what stopped a controller that never began: then it is the reason why the other side heard nothing."""
+    """Raise what stopped a controller that never began: there is no run to look at."""
     if controller.returncode == EXIT_FAULT_STOP:
         report, errors = controller.communicate()
         if json.loads(report)["end"] == "start refused":
