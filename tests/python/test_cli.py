@@ -424,7 +424,7 @@ def test_when_interrupted_expect_one_line_and_exit_130(design: Design, monkeypat
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("quasilpv.cli.synth.release", interrupt)
+    monkeypatch.setattr("quasilpv.release.release", interrupt)
     outcome = design("synth", "arm3")
     assert (outcome.code, outcome.err) == (130, "error: interrupted\n")
 
@@ -445,7 +445,7 @@ def test_when_a_verb_ends_without_its_answer_expect_json_to_tell_which_outcome_i
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("quasilpv.cli.synth.release", fail)
+    monkeypatch.setattr("quasilpv.release.release", fail)
     ended = design("synth", "arm3", "--json")
     assert (ended.code, ended.err) == (code, f"error: {error}\n")
     assert ended.out == "" if outcome is None else json.loads(ended.out) == {"outcome": outcome, "reason": str(error)}

@@ -37,7 +37,7 @@ class Call:
     Attributes:
         arguments: positional ones.
         options: those it needs.
-        stubs: names in the verb's module whose call is the beginning of the work.
+        stubs: names of the package whose call is the beginning of the work.
     """
 
     arguments: tuple[str, ...] = ()
@@ -47,23 +47,25 @@ class Call:
 
 QUESTION = {"--condition": "II.6"}
 VERB_ARGUMENTS = {
-    "demo": Call(stubs=("write_released",)),
+    "demo": Call(stubs=("cli.synth.write_released",)),
     "list": Call(),
     "synth": Call(("arm3",), {"--design": "pid"}),
     "inspect": Call(("ARTIFACT",)),
     "verify": Call(("ARTIFACT",)),
-    "robust": Call(("ARTIFACT",), stubs=("gate",)),
-    "export-sdp": Call(("ARTIFACT",), {"--out": "x"}, stubs=("shipped_problem",)),
-    "track": Call(("stabilise-arm2",), {"--controller": "pid"}, stubs=("run_all",)),
-    "animate": Call(("stabilise-arm2",), stubs=("progress",)),
-    "hil": Call(("serial-square",), {"--controller": "pid", "--real-time": ""}, stubs=("Session",)),
+    "robust": Call(("ARTIFACT",), stubs=("certificate.gate",)),
+    "export-sdp": Call(("ARTIFACT",), {"--out": "x"}, stubs=("synthesis.shipped_problem.shipped_problem",)),
+    "track": Call(("stabilise-arm2",), {"--controller": "pid"}, stubs=("cli.track.run_all",)),
+    "animate": Call(("stabilise-arm2",), stubs=("cli.animate.progress",)),
+    "hil": Call(("serial-square",), {"--controller": "pid", "--real-time": ""}, stubs=("cli.session.Session",)),
     "log": Call(("info", "LAST")),
-    "view": Call((), {"--live": "", "--artifact": "ARTIFACT"}, stubs=("LiveMotion",)),
+    "view": Call((), {"--live": "", "--artifact": "ARTIFACT"}, stubs=("view.live.LiveMotion",)),
     "solve": Call(("ex-I.1",), QUESTION),
-    "boundary": Call(("ex-I.1",), QUESTION | {"--over": "b=0:1"}, stubs=("find_boundary",)),
-    "region": Call(("ex-I.1",), QUESTION | {"--x": "a=0:1:2", "--y": "b=0:1:2"}, stubs=("Checkpoint",)),
-    "complexity": Call(("ex-I.1",), QUESTION, stubs=("print_table",)),
-    "reproduce": Call(("fig-II.1",), stubs=("reproduce",)),
+    "boundary": Call(("ex-I.1",), QUESTION | {"--over": "b=0:1"}, stubs=("studies.find_boundary",)),
+    "region": Call(
+        ("ex-I.1",), QUESTION | {"--x": "a=0:1:2", "--y": "b=0:1:2"}, stubs=("studies.checkpoint.Checkpoint",)
+    ),
+    "complexity": Call(("ex-I.1",), QUESTION, stubs=("cli.complexity.print_table",)),
+    "reproduce": Call(("fig-II.1",), stubs=("reproduction.reproduce",)),
 }
 
 
@@ -151,7 +153,7 @@ def test_when_a_value_is_no_usable_number_or_nothing_expect_one_line_or_the_work
         raise LegitimateError
 
     for stub in call.stubs:
-        monkeypatch.setattr(f"quasilpv.cli.{VERBS[option.verb].module}.{stub}", begin)
+        monkeypatch.setattr(f"quasilpv.{stub}", begin)
     others = [word for name, value in call.options.items() if name != option.name for word in (name, value)]
     base = [str(artifact) if word == "ARTIFACT" else word for word in [*call.arguments, *filter(None, others)]]
     for hole in option.holes:

@@ -26,7 +26,8 @@ from quasilpv.certificate.trigonometric import Polynomial, UnsupportedError
 from quasilpv.cli import run
 from quasilpv.errors import ClaimError, InfeasibleError, InputError
 from quasilpv.release import checked_artifact, to_artifact
-from quasilpv.synthesis import CONTROLLERS, TrackingDesign, synthesise
+from quasilpv.synthesis import CONTROLLERS, synthesise
+from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import robot, robots
 
 QUICK = [("arm2", "dob-acceleration"), ("arm2", "pdc"), ("arm2", "delayed"), ("spring-disc", "robust")]

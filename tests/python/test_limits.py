@@ -22,8 +22,9 @@ from quasilpv.experiments.track import (
 )
 from quasilpv.release import checked_artifact, to_artifact
 from quasilpv.scenarios import EXTERNAL_TORQUE, Sensors, build_scenario, motions_of, sine_torques, tracking_tasks
-from quasilpv.synthesis import TrackingDesign, synthesise
+from quasilpv.synthesis import synthesise
 from quasilpv.synthesis.actuator_demand import Motion, largest_gravity, predicted_increments, unmet_demands
+from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import robot, robots
 from quasilpv.trajectories import rest
 from reference.runs import synthetic_result, synthetic_run, tool_position

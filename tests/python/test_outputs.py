@@ -53,7 +53,7 @@ class Call:
 
     Attributes:
         arguments: of the verb; ARTIFACT and LOG stand for files.
-        answers: what names in its module return instead of working for minutes.
+        answers: what names of the package return instead of working for minutes.
         folder, file: the option for its output is of this kind.
         says: on standard output even without ``--json``.
     """
@@ -68,27 +68,41 @@ class Call:
 RELEASED = {"artifact": {}, "name": "name", "report": {}, "verification": {}}
 QUESTION = ("ex-I.1", "--condition", "II.6")
 CALLS = {
-    "demo": Call((), (("write_released", RELEASED), ("run_all", []), ("draw_results", None)), folder=True, says=False),
+    "demo": Call(
+        (),
+        (("cli.synth.write_released", RELEASED), ("cli.track.run_all", []), ("cli.session.draw_results", None)),
+        folder=True,
+        says=False,
+    ),
     "list": Call(),
-    "synth": Call(("arm3", "--design", "pid"), (("write_released", RELEASED | {"report": {"a": 1}}),), folder=True),
+    "synth": Call(
+        ("arm3", "--design", "pid"), (("cli.synth.write_released", RELEASED | {"report": {"a": 1}}),), folder=True
+    ),
     "inspect": Call(("ARTIFACT",)),
     "verify": Call(("ARTIFACT",)),
     "robust": Call(("ARTIFACT",), folder=True),
     "export-sdp": Call(("ARTIFACT",), file=True, says=False),
-    "track": Call(("stabilise-arm2", "--no-figures"), (("run_all", []),), folder=True, says=False),
-    "animate": Call(("stabilise-arm2",), (("_animate", {}), ("draw_results", None), ("Session.run", None)), True),
+    "track": Call(("stabilise-arm2", "--no-figures"), (("cli.track.run_all", []),), folder=True, says=False),
+    "animate": Call(
+        ("stabilise-arm2",),
+        (("cli.animate._animate", {}), ("cli.session.draw_results", None), ("cli.session.Session.run", None)),
+        True,
+    ),
     "hil": Call(("stabilise-arm2", "--controller", "pid", "--no-log"), folder=True),
     "log": Call(("info", "LOG")),
-    "view": Call(("--log", "LOG", "--no-browser"), (("Page", MagicMock(url="http://127.0.0.1")), ("_run", None))),
+    "view": Call(
+        ("--log", "LOG", "--no-browser"),
+        (("view.page.Page", MagicMock(url="http://127.0.0.1")), ("cli.view._run", None)),
+    ),
     "solve": Call((*QUESTION, "--set", "b=2.5")),
     "boundary": Call((*QUESTION, "--over", "b=0:1")),
     "region": Call((*QUESTION, "--x", "a=0:1:2", "--y", "b=0:1:2", "-j", "1"), folder=True),
     "complexity": Call(QUESTION),
-    "reproduce": Call(("fig-II.1", "--quick"), (("reproduce", []),), folder=True),
+    "reproduce": Call(("fig-II.1", "--quick"), (("reproduction.reproduce", []),), folder=True),
 }
 WITHOUT_JSON = {"view"}
 MORE = {
-    "log plot": Call(("plot", "LOG"), (("write_gallery", [Path("path.png")]),), folder=True),
+    "log plot": Call(("plot", "LOG"), (("figures.gallery.write_gallery", [Path("path.png")]),), folder=True),
     "log to-mcap": Call(("to-mcap", "LOG"), file=True),
 }
 """Actions of a verb that write files."""
@@ -105,7 +119,7 @@ def design(inputs: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPat
         verb = name.split(maxsplit=1)[0]
         wanted = {**CALLS, **MORE}[name]
         for stub, value in wanted.answers:
-            monkeypatch.setattr(f"quasilpv.cli.{VERBS[verb].module}.{stub}", MagicMock(return_value=value))
+            monkeypatch.setattr(f"quasilpv.{stub}", MagicMock(return_value=value))
         return run([verb, *(inputs.get(word, word) for word in wanted.arguments), *more])
 
     return call

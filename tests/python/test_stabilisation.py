@@ -24,7 +24,7 @@ from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.state_law import StateLaw
 from quasilpv.release import to_artifact
 from quasilpv.scenarios import Sensors, build_scenario
-from quasilpv.synthesis.acceleration_design import no_progress
+from quasilpv.synthesis.progress import no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.stabilisation import DECAY_PER_S, stabilisation
 from quasilpv.systems.catalogue import system

@@ -25,7 +25,8 @@ from quasilpv.experiments.run import FloatArray
 from quasilpv.experiments.track import TrackingExperiment, run_from_columns, track
 from quasilpv.release import release
 from quasilpv.scenarios import IdaIntegrator, Rk4Integrator, Scenario, Sensors, build_scenario
-from quasilpv.synthesis import Specification, TrackingDesign, synthesise
+from quasilpv.synthesis import Specification, synthesise
+from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import Robot, robot
 from reference.runs import synthetic_run
 

@@ -15,8 +15,9 @@ from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.velocity_law import VelocityLaw
 from quasilpv.release import Release, release
 from quasilpv.synthesis import CONTROLLERS, Specification, baselines, specification, tuned_baselines, tuning_search
-from quasilpv.synthesis.acceleration_design import design_acceleration_law, no_progress
+from quasilpv.synthesis.acceleration_design import design_acceleration_law
 from quasilpv.synthesis.plant_grid import PlantGrid
+from quasilpv.synthesis.progress import no_progress
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import robot
 from reference.step import ComputedTorque, OutputStage, Pid, Sample, SpeedFilter

@@ -43,7 +43,8 @@ from quasilpv.figures.tracking import plot_error, plot_path, plot_torque
 from quasilpv.files import read_bytes
 from quasilpv.release import checked_artifact
 from quasilpv.scenarios import Sensors, SineTorque, motions_of, tracking_tasks
-from quasilpv.synthesis import DEFAULT_CONTROLLER, TrackingDesign, specification_for, synthesise, without_compensation
+from quasilpv.synthesis import DEFAULT_CONTROLLER, specification_for, synthesise, without_compensation
+from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems import registry
 from quasilpv.systems.registry import Robot
 from quasilpv.trajectories import TaskPath, Trajectory, plan

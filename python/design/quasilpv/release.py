@@ -19,10 +19,11 @@ from quasilpv.artifact.canonical import document_hash
 from quasilpv.artifact.compilation import compile_program
 from quasilpv.certificate import CHECKERS, Evidence, gate, verify
 from quasilpv.errors import ClaimError
-from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, TrackingDesign, synthesise, without_compensation
-from quasilpv.synthesis.acceleration_design import Progress, no_progress
+from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, synthesise, without_compensation
 from quasilpv.synthesis.actuator_demand import MotionsOf, no_motions, unmet_demands
 from quasilpv.synthesis.baselines import reference_speeds
+from quasilpv.synthesis.progress import Progress, no_progress
+from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import Robot, robot
 
 NEEDED_OF_CLAIMS = Evidence.ENCLOSED

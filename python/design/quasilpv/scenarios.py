@@ -28,6 +28,7 @@ from quasilpv.artifact.canonical import (
 )
 from quasilpv.artifact.programs import MAX_JOINTS
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
+from quasilpv.defaults import ENCODER_BITS
 from quasilpv.errors import InputError, one_of
 from quasilpv.files import read_bytes, write_readable_json
 from quasilpv.synthesis.actuator_demand import Motion
@@ -46,7 +47,6 @@ Vector = tuple[float, ...]
 NOISE_SEED = 20220315
 """Seed of the speed noise in every scenario of the registry: fixed, so that two runs see the same noise."""
 
-ENCODER_BITS = 20
 VELOCITY_NOISE_RAD_S = 0.05
 
 

@@ -19,13 +19,12 @@ from typing import Any, NoReturn
 import cbor2
 import rfc8785
 
+from quasilpv.defaults import LARGEST_WRITTEN
 from quasilpv.errors import InputError
 from quasilpv.files import MAX_FILE_BYTES
 
 MAX_DEPTH = 32
 MAX_SAFE_INTEGER = 2**53 - 1
-LARGEST_WRITTEN = 1e16
-"""Of numbers that people write: products of a few of them are finite, and as a count none of them fits into memory."""
 
 Document = dict[str, Any]
 

@@ -22,7 +22,7 @@ def run(arguments: Sequence[str]) -> int:
     Args:
         arguments: the command line without the program's name.
     """
-    from quasilpv.cli import app  # noqa: PLC0415
+    from quasilpv.cli import app
 
     return app.run(arguments)
 
@@ -30,7 +30,7 @@ def run(arguments: Sequence[str]) -> int:
 def main() -> None:
     """Entry point of the command ``design``."""
     _require_stack()
-    from quasilpv.cli import app  # noqa: PLC0415
+    from quasilpv.cli import app
 
     app.main()
 

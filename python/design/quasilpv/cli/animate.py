@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from quasilpv.cli.console import JsonOption, Steps, print_json, print_note, progress
 from quasilpv.cli.options import EncoderOption, FormatOption, LogOption, PlantOption, RateOption, formats_of, plant_kind
-from quasilpv.cli.results import print_results
-from quasilpv.cli.session import Session, draw_results
-from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import PlantKind, TrackingExperiment
-from quasilpv.figures.animation import write_animation
-from quasilpv.scenarios import ENCODER_BITS
+from quasilpv.defaults import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
+
+if TYPE_CHECKING:
+    from quasilpv.cli.session import Session
+    from quasilpv.experiments.result import TrackResult
+    from quasilpv.experiments.track import TrackingExperiment
 
 DEFAULT_SCENARIOS = ("serial-square", "serial-circle", "fivebar-spiral")
 FILE_NAME = "animation.gif"
@@ -50,6 +50,11 @@ def animate_command(
     Example:
       design animate serial-square fivebar-spiral --rate-hz 2000
     """
+    from quasilpv.cli.results import print_results
+    from quasilpv.cli.session import Session, draw_results
+    from quasilpv.experiments.result import Variant
+    from quasilpv.experiments.track import PlantKind, TrackingExperiment
+
     formats = formats_of(figure_formats)
     experiments = [TrackingExperiment.registered(name) for name in dict.fromkeys(scenarios or DEFAULT_SCENARIOS)]
     bits = ENCODER_BITS if encoder_bits is None else encoder_bits
@@ -78,6 +83,8 @@ def animate_command(
 
 def _animate(session: Session, experiment: TrackingExperiment, pair: list[TrackResult], steps: Steps) -> dict[str, Any]:
     """Write the animation of a scenario; its entry of ``--json``."""
+    from quasilpv.figures.animation import write_animation
+
     steps.begin(f"{experiment.name}: animation")
     path = session.out / experiment.name / FILE_NAME
     robot = experiment.robot.with_payload_fraction(1.0 if session.plant == "perturbed" else 0.0)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json
 from quasilpv.cli.parameters import asks_one_question, interval
-from quasilpv.studies import Evidence, find_boundary
-from quasilpv.studies.boundary import RELATIVE_TOLERANCE
-from quasilpv.studies.question import Question
+from quasilpv.defaults import RELATIVE_TOLERANCE
+
+if TYPE_CHECKING:
+    from quasilpv.studies.question import Question
 
 
 @asks_one_question
@@ -31,6 +32,8 @@ def boundary_command(
     Example:
       design boundary ex-I.1 --condition II.6 --set a=1 --over b=0:30
     """
+    from quasilpv.studies import Evidence, find_boundary
+
     searched = interval(over, "--over")
     found = find_boundary(asked, searched, tolerance)
     if json:

@@ -8,10 +8,7 @@ import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_table
 from quasilpv.cli.parameters import CommonOption, RepresentationOption, SetOption, SlackOption, SystemArgument, question
-from quasilpv.conditions.blocks import Slack
-from quasilpv.conditions.condition import Options
-from quasilpv.studies import count
-from quasilpv.systems.catalogue import system_kind
+from quasilpv.conditions.choices import Slack
 
 COLUMNS = ("vertices", "unknowns", "slack_unknowns", "inequalities", "rows", "entries")
 
@@ -37,6 +34,10 @@ def complexity_command(
     Example:
       design complexity ex-I.1 --condition II.5 --condition II.6
     """
+    from quasilpv.conditions.condition import Options
+    from quasilpv.studies import count
+    from quasilpv.systems.catalogue import system_kind
+
     asked = [
         question(system, name, representation, parameters, Options(slack=slack, common=common)) for name in conditions
     ]

@@ -9,11 +9,6 @@ import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note
 from quasilpv.cli.options import FormatOption, formats_of, specification
-from quasilpv.cli.results import print_results
-from quasilpv.cli.session import Session, draw_results
-from quasilpv.cli.synth import write_released
-from quasilpv.cli.track import default_variants, run_all
-from quasilpv.experiments.track import TrackingExperiment
 from quasilpv.files import claim_folder
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
@@ -42,6 +37,12 @@ def demo_command(
     Example:
       design demo
     """
+    from quasilpv.cli.results import print_results
+    from quasilpv.cli.session import Session, draw_results
+    from quasilpv.cli.synth import write_released
+    from quasilpv.cli.track import default_variants, run_all
+    from quasilpv.experiments.track import TrackingExperiment
+
     formats = formats_of(figure_formats)
     claim_folder(out)
     if not json:

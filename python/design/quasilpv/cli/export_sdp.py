@@ -7,11 +7,8 @@ from typing import Annotated
 
 import typer
 
-from quasilpv.artifact import read_artifact
 from quasilpv.cli.console import JsonOption, print_json, print_note
 from quasilpv.files import claim_file, write_atomically
-from quasilpv.lmi import SdpaProgram
-from quasilpv.synthesis.shipped_problem import shipped_problem
 
 
 def export_sdp_command(
@@ -29,6 +26,10 @@ def export_sdp_command(
     Example:
       design export-sdp out/arm3/artifact.json -o out/arm3/problem.dat-s
     """
+    from quasilpv.artifact import read_artifact
+    from quasilpv.lmi import SdpaProgram
+    from quasilpv.synthesis.shipped_problem import shipped_problem
+
     shipped = read_artifact(artifact)
     claim_file(out)
     problem = shipped_problem(shipped.content(), str(artifact))

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from quasilpv.artifact import read_artifact
 from quasilpv.cli.console import JsonOption, print_json, print_table, progress
 from quasilpv.cli.options import (
     ArtifactOption,
@@ -19,14 +18,15 @@ from quasilpv.cli.options import (
     require_controller,
     sensors_of,
 )
-from quasilpv.cli.results import COLUMNS, cells, print_warnings
-from quasilpv.cli.session import Session
+from quasilpv.defaults import ENCODER_BITS, WATCHDOG_S
 from quasilpv.errors import FaultStop, InputError
-from quasilpv.experiments.hil import HilResult, RealTimeOptions, require_identical, run_over_lcm
-from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, variant_of
-from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
+
+if TYPE_CHECKING:
+    from quasilpv.cli.session import Session
+    from quasilpv.experiments.hil import HilResult, RealTimeOptions
+    from quasilpv.experiments.result import TrackResult, Variant
+    from quasilpv.experiments.track import TrackingExperiment
 
 LATENCIES = ("wakeup_ns", "round_trip_ns")
 COUNTERS = ("missed_commands", "late_commands", "watchdog_samples", "overruns", "skipped_ticks")
@@ -39,10 +39,10 @@ def hil_command(
     real_time: Annotated[bool, typer.Option("--real-time", help="Paced by the clock instead of lock-step.")] = False,
     silence_s: Annotated[
         float, typer.Option("--silence-s", min=1e-3, help="Real time: fault after so long without a measurement.")
-    ] = RealTimeOptions.silence_s,
+    ] = WATCHDOG_S,
     hold_s: Annotated[
         float, typer.Option("--hold-s", min=1e-3, help="Real time: the plant brakes after so long without a command.")
-    ] = RealTimeOptions.hold_s,
+    ] = WATCHDOG_S,
     priority: Annotated[
         int | None, typer.Option("--priority", min=1, max=99, help="Real time: lock memory, use SCHED_FIFO.")
     ] = None,
@@ -75,6 +75,13 @@ def hil_command(
     Example:
       design hil serial-square --real-time
     """
+    from quasilpv.artifact import read_artifact
+    from quasilpv.cli.results import print_warnings
+    from quasilpv.cli.session import Session
+    from quasilpv.experiments.hil import RealTimeOptions, require_identical
+    from quasilpv.experiments.result import Variant
+    from quasilpv.experiments.track import PlantKind, TrackingExperiment, variant_of
+
     if priority is not None and not real_time:
         raise InputError("command line", "--priority", priority, "nothing without --real-time: lock-step has no clock")
     given = None if artifact is None else read_artifact(artifact)
@@ -112,6 +119,8 @@ def _run_both(
     key: Path | None,
 ) -> tuple[HilResult, TrackResult]:
     """The run over LCM, in lock-step without options of real time, and the same in this process."""
+    from quasilpv.experiments.hil import run_over_lcm
+
     with progress(2) as steps:
         steps.begin("in process")
         in_process = session.run(experiment, variant, steps)
@@ -148,6 +157,8 @@ def _row(over_lcm: HilResult, in_process: TrackResult) -> dict[str, Any]:
 
 
 def _print(over_lcm: HilResult, in_process: TrackResult) -> None:
+    from quasilpv.cli.results import COLUMNS, cells
+
     title = f"{in_process.title}, {in_process.plant} plant, {in_process.rate_hz:g} Hz"
     columns = ("", *COLUMNS[1:])
     print_table(title, columns, [cells(in_process, "in process"), cells(over_lcm.result, f"over LCM, {over_lcm.mode}")])

@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 import typer
 
-from quasilpv.artifact import read_artifact, summary
 from quasilpv.cli.console import JsonOption, print_json, print_table
 
 
@@ -21,6 +20,8 @@ def inspect_command(
     Example:
       design inspect out/arm3/artifact.json
     """
+    from quasilpv.artifact import read_artifact, summary
+
     contents = summary(read_artifact(artifact))
     if json:
         print_json(contents)

@@ -5,13 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from quasilpv.cli.console import JsonOption, print_json, print_table
-from quasilpv.conditions.registry import CONDITIONS
 from quasilpv.errors import InputError
-from quasilpv.reproduction import ITEMS
-from quasilpv.scenarios import tracking_tasks
 from quasilpv.synthesis import CONTROLLERS
-from quasilpv.systems.catalogue import system_kind, system_names
-from quasilpv.systems.registry import robots
 
 
 def listing_command(json: JsonOption = False) -> None:
@@ -21,6 +16,12 @@ def listing_command(json: JsonOption = False) -> None:
     Example:
       design list --json
     """
+    from quasilpv.conditions.registry import CONDITIONS
+    from quasilpv.reproduction import ITEMS
+    from quasilpv.scenarios import tracking_tasks
+    from quasilpv.systems.catalogue import system_names
+    from quasilpv.systems.registry import robots
+
     known: dict[str, list[dict[str, Any]]] = {
         "robots": [{"id": robot.id, "summary": robot.summary} for robot in robots()],
         "controllers": [{"id": name, "summary": kind.summary} for name, kind in CONTROLLERS.items()],
@@ -38,6 +39,8 @@ def listing_command(json: JsonOption = False) -> None:
 
 def _system(name: str) -> dict[str, Any]:
     """A system; of one whose package cannot be loaded, why."""
+    from quasilpv.systems.catalogue import system_kind
+
     try:
         kind = system_kind(name)
     except InputError as error:

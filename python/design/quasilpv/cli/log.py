@@ -6,23 +6,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
 from quasilpv.cli.logs import LogArtifactOption, open_log
 from quasilpv.cli.options import FormatOption, formats_of
 from quasilpv.errors import ClaimError, InputError
-from quasilpv.experiments.logged import logged_result
-from quasilpv.figures.gallery import write_gallery
 from quasilpv.files import claim_file, claim_folder
-from quasilpv.telemetry import RunLog
-from quasilpv.telemetry.codes import AT_LIMIT, event_in_words
-from quasilpv.telemetry.log import ARTIFACT, HEADER, Messages
-from quasilpv.telemetry.mcap_export import write_mcap
-from quasilpv.telemetry.replay import replay
+
+if TYPE_CHECKING:
+    from quasilpv.telemetry import RunLog
+    from quasilpv.telemetry.log import Messages
 
 
 class Action(StrEnum):
@@ -85,6 +81,11 @@ def _info(log: RunLog, _: Path | None, json: bool) -> None:
 
 
 def _about(log: RunLog) -> dict[str, Any]:
+    import numpy as np
+
+    from quasilpv.telemetry.codes import AT_LIMIT
+    from quasilpv.telemetry.log import ARTIFACT, HEADER
+
     telemetry, about = log["telemetry"], {"log": log.source, "duration_s": round(log.duration_s, 6)}
     if HEADER in log.documents:
         scenario = log.scenario
@@ -117,6 +118,8 @@ def _channels(log: RunLog) -> dict[str, dict[str, Any]]:
 
 def _events(log: RunLog) -> list[dict[str, Any]]:
     """Who said what at which sample, in the order of the log."""
+    from quasilpv.telemetry.codes import event_in_words
+
     return [{"seq": int(record["seq"]), "event": event_in_words(record)} for record in log["event"].records]
 
 
@@ -132,6 +135,9 @@ def _cell(value: float | None) -> str:
 
 
 def _plot(log: RunLog, out: Path | None, formats: Sequence[str], json: bool) -> None:
+    from quasilpv.experiments.logged import logged_result
+    from quasilpv.figures.gallery import write_gallery
+
     folder = out or Path(log.source).parent
     claim_folder(folder)
     files = write_gallery(logged_result(log), folder, formats)
@@ -142,6 +148,8 @@ def _plot(log: RunLog, out: Path | None, formats: Sequence[str], json: bool) -> 
 
 
 def _replay(log: RunLog, _: Path | None, json: bool) -> None:
+    from quasilpv.telemetry.replay import replay
+
     shown = replay(log)
     if json:
         print_json({"log": log.source, "artifact_hash": log.artifact.hash, **asdict(shown)})
@@ -153,6 +161,8 @@ def _replay(log: RunLog, _: Path | None, json: bool) -> None:
 
 
 def _to_mcap(log: RunLog, out: Path | None, json: bool) -> None:
+    from quasilpv.telemetry.mcap_export import write_mcap
+
     path = out or Path(log.source).with_suffix(".mcap")
     claim_file(path)
     count = write_mcap(log, path)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from quasilpv.artifact import read_artifact
 from quasilpv.cli.console import print_note
-from quasilpv.telemetry import RunLog, latest_log, read_log
-from quasilpv.telemetry.log import LAST
+from quasilpv.defaults import LAST
+
+if TYPE_CHECKING:
+    from quasilpv.telemetry import RunLog
 
 LogArtifactOption: TypeAlias = Annotated[
     Path | None,
@@ -24,6 +25,8 @@ def log_path(text: str) -> Path:
     Raises:
         InputError: LAST, and there is no log.
     """
+    from quasilpv.telemetry import latest_log
+
     return latest_log() if text == LAST else Path(text)
 
 
@@ -33,6 +36,9 @@ def open_log(text: str, artifact: Path | None) -> RunLog:
     Raises:
         InputError: it cannot be read, or it is of a run with another controller.
     """
+    from quasilpv.artifact import read_artifact
+    from quasilpv.telemetry import read_log
+
     log = read_log(log_path(text))
     if log.incomplete_bytes:
         print_note(

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from quasilpv.artifact import Artifact
+from quasilpv.defaults import DEFAULT_FORMATS, ENCODER_BITS
 from quasilpv.errors import InputError, one_of
-from quasilpv.experiments.designs import kept_design
-from quasilpv.experiments.result import Variant
-from quasilpv.figures.style import DEFAULT_FORMATS, require_formats
-from quasilpv.scenarios import ENCODER_BITS, Sensors
 from quasilpv.synthesis import CONTROLLERS, ControllerKind, Specification, specification_for
-from quasilpv.synthesis.acceleration_design import Progress
-from quasilpv.systems.registry import robot
+from quasilpv.synthesis.progress import Progress
+
+if TYPE_CHECKING:
+    from quasilpv.artifact import Artifact
+    from quasilpv.experiments.result import Variant
+    from quasilpv.scenarios import Sensors
 
 SHORT_NAMES = {"acceleration": "dob-acceleration", "moving": "dob-moving", "torque": "dob-torque"}
 
@@ -88,6 +88,8 @@ def formats_of(names: Sequence[str] | None) -> tuple[str, ...]:
     Raises:
         InputError: one is none of `quasilpv.figures.style.FORMATS`.
     """
+    from quasilpv.figures.style import require_formats
+
     return require_formats(names or DEFAULT_FORMATS)
 
 
@@ -97,6 +99,8 @@ def sensors_of(encoder_bits: int) -> Sensors:
     Raises:
         InputError: not 0 to 32 bits.
     """
+    from quasilpv.scenarios import Sensors
+
     if not 0 <= encoder_bits <= 32:
         raise InputError("command line", "--encoder-bits", encoder_bits, "0 (exact angles) to 32")
     return Sensors(encoder_bits=encoder_bits)
@@ -128,6 +132,8 @@ def specification(
     Raises:
         InputError: an unknown robot, or a number out of range.
     """
+    from quasilpv.systems.registry import robot
+
     return specification_for(
         robot(robot_id),
         controller,
@@ -140,6 +146,8 @@ def specification(
 
 def designed(robot_id: str, variant: Variant, rate_hz: float | None, progress: Progress) -> Artifact:
     """The controller of a variant, designed for its encoders; from the cache if it was designed before."""
+    from quasilpv.experiments.designs import kept_design
+
     return kept_design(
         robot_id,
         variant.controller,

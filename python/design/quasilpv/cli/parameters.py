@@ -6,19 +6,20 @@ import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
 import typer
 
 from quasilpv.cli.usage import NUMBER_EXPECTED, number
-from quasilpv.conditions.blocks import Slack
-from quasilpv.conditions.condition import Form, Options
+from quasilpv.conditions.choices import Form, Slack
+from quasilpv.defaults import DEFAULT_MEMORY_GIB, DEFAULT_TIME_S, REPRESENTATIONS, SAMPLE_PERIOD_S
 from quasilpv.errors import InputError
-from quasilpv.lmi.budget import DEFAULT_MEMORY_GIB, DEFAULT_TIME_S, Limits
-from quasilpv.polytopes.representation import REPRESENTATIONS
-from quasilpv.studies.boundary import Interval
-from quasilpv.studies.question import Question
-from quasilpv.studies.region import Axis
+
+if TYPE_CHECKING:
+    from quasilpv.conditions.condition import Options
+    from quasilpv.studies.boundary import Interval
+    from quasilpv.studies.question import Question
+    from quasilpv.studies.region import Axis
 
 Result = TypeVar("Result")
 
@@ -85,6 +86,8 @@ def question(
     Raises:
         InputError: unknown system, condition, representation or parameter, or not a number.
     """
+    from quasilpv.studies.question import Question
+
     values = tuple(_named_number(text) for text in settings or ())
     return Question(system, condition, representation, values, options)
 
@@ -100,11 +103,14 @@ def _stated(
     form: FormOption = Form.REDUCED,
     common: CommonOption = False,
     window_s: WindowOption = None,
-    sample_period_s: SampleOption = Options.sample_period_s,
+    sample_period_s: SampleOption = SAMPLE_PERIOD_S,
     time_limit: TimeLimitOption = DEFAULT_TIME_S,
     memory_limit: MemoryLimitOption = DEFAULT_MEMORY_GIB,
 ) -> Question:
     """The question of one condition; its parameters are the options of every verb that asks one."""
+    from quasilpv.conditions.condition import Options
+    from quasilpv.lmi.budget import Limits
+
     options = Options(slack, decay, form, window_s=window_s, common=common, sample_period_s=sample_period_s)
     asked = question(system, condition, representation, parameters, options)
     return replace(asked, limits=Limits(time_limit, memory_limit))
@@ -119,18 +125,28 @@ def asks_one_question(verb: Callable[..., Result]) -> Callable[..., Result]:
     Returns:
         The function of all options, required ones first, that states the question and calls ``verb``.
     """
-    shared = inspect.signature(_stated, eval_str=True).parameters
-    _, *own = inspect.signature(verb, eval_str=True).parameters.values()
+    shared, own = _options_of(_stated), _options_of(verb)
 
     @wraps(verb)
     def command(**given: Any) -> Result:
         stated = {name: given.pop(name) for name in shared}
         return verb(_stated(**stated), **given)
 
-    options = sorted([*shared.values(), *own], key=lambda option: option.default is not option.empty)
+    options = sorted([*shared.values(), *own.values()], key=lambda option: option.default is not option.empty)
     command.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     command.__annotations__ = {option.name: option.annotation for option in options}
     return command
+
+
+def _options_of(function: Callable[..., object]) -> dict[str, inspect.Parameter]:
+    """The options of a function, with what typer reads in their annotations; a question is none.
+
+    Its type is not looked up: the help of a verb needs no library behind it.
+    """
+    written = inspect.signature(function).parameters
+    stated = {name: option for name, option in written.items() if option.annotation != "Question"}
+    types = {name: eval(option.annotation, function.__globals__) for name, option in stated.items()}
+    return {name: option.replace(annotation=types[name]) for name, option in stated.items()}
 
 
 def interval(text: str, option: str) -> Interval:
@@ -139,6 +155,8 @@ def interval(text: str, option: str) -> Interval:
     Raises:
         InputError: another form.
     """
+    from quasilpv.studies.boundary import Interval
+
     name, numbers = _named_range(text, option, 2)
     return Interval(name, numbers[0], numbers[1])
 
@@ -149,6 +167,8 @@ def axis(text: str, option: str) -> Axis:
     Raises:
         InputError: another form, or a number of points that is not whole.
     """
+    from quasilpv.studies.region import Axis
+
     name, numbers = _named_range(text, option, 3)
     if not (numbers[2].is_integer() and numbers[2] <= MOST_POINTS):
         raise InputError("command line", option, text, f"a whole number of points, at most {MOST_POINTS}")

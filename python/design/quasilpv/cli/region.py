@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,13 +13,11 @@ from quasilpv.cli.console import JsonOption, print_json, print_note, progress
 from quasilpv.cli.options import FormatOption, formats_of
 from quasilpv.cli.parameters import asks_one_question, axis
 from quasilpv.errors import InputError
-from quasilpv.figures.region import region_figure
-from quasilpv.figures.style import save
 from quasilpv.files import claim_folder, write_readable_json
-from quasilpv.studies.checkpoint import Checkpoint
-from quasilpv.studies.engines import in_processes, on_cluster
-from quasilpv.studies.question import Question
-from quasilpv.studies.region import Areas, Axis, Map, Region, counts
+
+if TYPE_CHECKING:
+    from quasilpv.studies.question import Question
+    from quasilpv.studies.region import Areas, Axis, Region
 
 MOST_PROCESSES = 1024
 
@@ -55,6 +53,10 @@ def region_command(
     Example:
       design region ex-I.1 --condition II.6 --x a=-8:8:17 --y b=-20:20:41
     """
+    from quasilpv.studies.checkpoint import Checkpoint
+    from quasilpv.studies.engines import in_processes, on_cluster
+    from quasilpv.studies.region import Map, counts
+
     formats = formats_of(figure_formats)
     across, up = axis(x, "--x"), axis(y, "--y")
     if processes is not None and not 1 <= processes <= MOST_PROCESSES:
@@ -100,6 +102,9 @@ def _points_only(x: Axis, y: Axis, *, possible: bool) -> str:
 
 def _write(region: Region, stem: Path, formats: Sequence[str]) -> list[Path]:
     """The map and its figure."""
+    from quasilpv.figures.region import region_figure
+    from quasilpv.figures.style import save
+
     document = stem.with_name(f"{stem.name}.json")
     write_readable_json(document, region.to_document())
     return [document, *save(region_figure([region]), stem, formats)]

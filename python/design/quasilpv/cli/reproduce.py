@@ -11,7 +11,6 @@ from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
 from quasilpv.cli.options import FormatOption, formats_of
 from quasilpv.errors import InputError
 from quasilpv.files import claim_folder
-from quasilpv.reproduction import ITEMS, Effort, item, reproduce
 
 REASON_WIDTH = 100
 
@@ -37,6 +36,8 @@ def reproduce_command(
       design reproduce fig-II.7 table-II.4
       design reproduce --all --quick
     """
+    from quasilpv.reproduction import ITEMS, Effort, item, reproduce
+
     if everything == bool(ids):
         got = "both items and --all" if ids else "nothing"
         raise InputError("command line", "reproduce", got, "--all, or items of design list")

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quasilpv.artifact import read_artifact
-from quasilpv.certificate import Gate, gate
-from quasilpv.certificate.gate import RobustGate
-from quasilpv.certificate.gate_rationals import to_float
-from quasilpv.certificate.grid_gate import GridGate
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
 from quasilpv.cli.options import FormatOption, formats_of
-from quasilpv.figures.gate import gate_figure
-from quasilpv.figures.style import save
 from quasilpv.files import claim_folder
+
+if TYPE_CHECKING:
+    from quasilpv.certificate import Gate
+    from quasilpv.certificate.gate import RobustGate
+    from quasilpv.certificate.grid_gate import GridGate
 
 MARGIN_FIGURE, GROWTH_FIGURE = "inertia-margin", "growth-rate"
 WHILE = "while no torque or slew limit acts"
@@ -42,6 +40,10 @@ def robust_command(
     Example:
       design robust out/arm3/artifact.json -o out/arm3
     """
+    from quasilpv.artifact import read_artifact
+    from quasilpv.certificate import gate
+    from quasilpv.certificate.gate import RobustGate
+
     formats = formats_of(figure_formats)
     if out is not None:
         claim_folder(out)
@@ -60,6 +62,10 @@ def robust_command(
 
 def _draw(found: Gate, out: Path, formats: Sequence[str]) -> list[Path]:
     """The figure of either gate."""
+    from quasilpv.certificate.grid_gate import GridGate
+    from quasilpv.figures.gate import gate_figure
+    from quasilpv.figures.style import save
+
     name = GROWTH_FIGURE if isinstance(found, GridGate) else MARGIN_FIGURE
     return save(gate_figure(found), out / name, formats)
 
@@ -88,6 +94,8 @@ def _grid_answer(found: GridGate) -> tuple[list[tuple[str, str]], str]:
 
 def _rows(gate: RobustGate) -> list[tuple[str, str]]:
     """What a person wants to know, one line each."""
+    from quasilpv.certificate.gate_rationals import to_float
+
     margin = _interval(*gate.margin.to_floats()) if gate.margin else "none"
     needed = _interval(*gate.needed.to_floats()) if gate.needed else "none"
     rows = [

@@ -9,6 +9,7 @@ from pathlib import Path
 from quasilpv.artifact import Artifact
 from quasilpv.cli.console import Steps, print_note, progress
 from quasilpv.cli.options import designed, sensors_of
+from quasilpv.defaults import DEFAULT_FORMATS
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.track import (
     PlantKind,
@@ -18,7 +19,6 @@ from quasilpv.experiments.track import (
     track,
 )
 from quasilpv.figures.gallery import write_comparison, write_gallery
-from quasilpv.figures.style import DEFAULT_FORMATS
 from quasilpv.files import claim_folder
 from quasilpv.telemetry import LOG_NAME
 from quasilpv.telemetry.log import point_to

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from quasilpv.cli.console import JsonOption, print_json
 from quasilpv.cli.parameters import asks_one_question
-from quasilpv.studies import Verdict, answered
-from quasilpv.studies.answer import reliance_document
-from quasilpv.studies.question import Question, largest_or_reached_margin
+
+if TYPE_CHECKING:
+    from quasilpv.studies.question import Question
 
 
 @asks_one_question
@@ -26,6 +28,10 @@ def solve_command(
       design solve ex-I.1 --condition II.6 --set a=1 --set b=2.5
       design solve ex-I.1 --condition II.6 --set b=3 --slack full --json
     """
+    from quasilpv.studies import Verdict, answered
+    from quasilpv.studies.answer import reliance_document
+    from quasilpv.studies.question import largest_or_reached_margin
+
     answer = answered(asked)
     margin = largest_or_reached_margin(asked, answer)
     if json:

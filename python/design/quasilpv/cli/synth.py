@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 import typer
 
-from quasilpv.artifact import write_artifact
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table, progress
 from quasilpv.cli.options import (
     SHORT_NAMES,
@@ -19,10 +18,7 @@ from quasilpv.cli.options import (
     specification,
 )
 from quasilpv.files import claim_folder
-from quasilpv.release import release
-from quasilpv.scenarios import motions_of
 from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, Specification
-from quasilpv.systems.registry import robot
 
 
 def synth_command(
@@ -56,6 +52,8 @@ def synth_command(
     Example:
       design synth arm3 --rate-hz 2000 -o out/arm3-2khz
     """
+    from quasilpv.systems.registry import robot
+
     robot(robot_id)
     design = require_controller(controller)
     wanted = specification(
@@ -79,6 +77,10 @@ def write_released(
         InputError: unknown names, or the folder cannot be written.
         InfeasibleError: no design meets the specification, or what it claims does not hold.
     """
+    from quasilpv.artifact import write_artifact
+    from quasilpv.release import release
+    from quasilpv.scenarios import motions_of
+
     with progress(1) as steps:
         steps.begin(f"{design} for {robot_id}")
         made = release(

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, cast
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from quasilpv.artifact import Artifact, read_artifact
 from quasilpv.cli.console import JsonOption, print_json, progress
 from quasilpv.cli.options import (
     ArtifactOption,
@@ -22,15 +21,17 @@ from quasilpv.cli.options import (
     require_controller,
     sensors_of,
 )
-from quasilpv.cli.results import print_results, print_warnings
-from quasilpv.cli.session import Session, draw_results
+from quasilpv.defaults import ENCODER_BITS
 from quasilpv.errors import InputError
-from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, robot_of, variant_of
 from quasilpv.files import write_readable_json
-from quasilpv.scenarios import ENCODER_BITS
 from quasilpv.synthesis import DEFAULT_CONTROLLER
-from quasilpv.systems.registry import Robot, robot
+
+if TYPE_CHECKING:
+    from quasilpv.artifact import Artifact
+    from quasilpv.cli.session import Session
+    from quasilpv.experiments.result import TrackResult, Variant
+    from quasilpv.experiments.track import TrackingExperiment
+    from quasilpv.systems.registry import Robot
 
 DEFAULT_CONTROLLERS = (
     "pid",
@@ -92,6 +93,10 @@ def track_command(
       design track serial-square serial-circle --controller dob-acceleration
       design track --trajectory path.json --robot fivebar
     """
+    from quasilpv.cli.results import print_results, print_warnings
+    from quasilpv.cli.session import Session, draw_results
+    from quasilpv.experiments.track import PlantKind, TrackingExperiment
+
     formats = formats_of(figure_formats)
     given = None if artifact is None else _given(artifact, controllers, rate_hz, no_compensation)
     experiments = [TrackingExperiment.registered(name) for name in dict.fromkeys(scenarios or [])]
@@ -131,12 +136,16 @@ def run_all(
 
 def default_variants() -> list[Variant]:
     """The controllers that run if none is chosen."""
+    from quasilpv.experiments.result import Variant
+
     coarse = Variant(DEFAULT_CONTROLLER, COARSE_ENCODER_BITS)
     return [*(Variant(name, ENCODER_BITS) for name in DEFAULT_CONTROLLERS), coarse]
 
 
 def _given(path: Path, controllers: Sequence[str] | None, rate_hz: float | None, no_compensation: bool) -> Artifact:
     """The controller of --artifact, which leaves nothing to choose."""
+    from quasilpv.artifact import read_artifact
+
     chosen = {"--controller": controllers, "--rate-hz": rate_hz, "--no-compensation": no_compensation or None}
     for option, value in chosen.items():
         if value:
@@ -150,6 +159,9 @@ def _follower(given: Artifact | None, robot_id: str | None) -> Robot:
     Raises:
         InputError: there is neither, they differ, or the registry does not know the robot.
     """
+    from quasilpv.experiments.track import robot_of
+    from quasilpv.systems.registry import robot
+
     if given is None and robot_id is None:
         raise InputError("command line", "--robot", "nothing", "who follows --trajectory, or --artifact FILE")
     if given is None:
@@ -162,6 +174,9 @@ def _follower(given: Artifact | None, robot_id: str | None) -> Robot:
 def _variants(
     given: Artifact | None, controllers: Sequence[str] | None, encoder_bits: int | None, no_compensation: bool
 ) -> list[Variant]:
+    from quasilpv.experiments.result import Variant
+    from quasilpv.experiments.track import variant_of
+
     bits = ENCODER_BITS if encoder_bits is None else encoder_bits
     sensors = sensors_of(bits)
     if given is not None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
-from pydantic import ValidationError
 
-from quasilpv.artifact.canonical import LARGEST_WRITTEN
+from quasilpv.defaults import LARGEST_WRITTEN
 from quasilpv.errors import InputError, one_of
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 NUMBERS = {"float_parsing": "a number", "int_parsing": "a whole number", "int_from_float": "a whole number"}
 NUMBER_EXPECTED = f"a number between -{LARGEST_WRITTEN:g} and {LARGEST_WRITTEN:g}"
@@ -66,6 +68,8 @@ def number(text: str) -> float | None:
 
 def _parts(error: typer.TyperException, context: Any) -> tuple[str, str, str]:
     """Field, got, expected; of mistakes the parser has its own words for, those."""
+    from pydantic import ValidationError
+
     parameter = getattr(error, "param", None)
     field = "arguments" if parameter is None else _name(parameter)
     option = getattr(error, "option_name", None)

@@ -1,7 +1,11 @@
 """The verbs of the command, each imported only when it is called.
 
 Most verbs need libraries that take a second to load: symbolic algebra, solvers, plotting. The table below is all that
-help and error messages need of them.
+help and error messages need of the verbs, and the signature of a verb's function is all that its own help needs.
+Therefore a module of a verb imports at its top only what states options; what the verb works with is imported in the
+bodies of its functions, and what only annotations name, under ``TYPE_CHECKING``. The same holds for what verbs share at
+their tops (`options`, `parameters`, `console`, `logs`, `usage`). Numbers that help pages state are in
+`quasilpv.defaults`.
 """
 
 from __future__ import annotations

@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-from quasilpv.artifact import read_artifact
-from quasilpv.certificate import verify
 from quasilpv.cli.console import JsonOption, print_json, print_table
 
 
@@ -26,6 +24,9 @@ def verify_command(
     Example:
       design verify out/arm3/artifact.json
     """
+    from quasilpv.artifact import read_artifact
+    from quasilpv.certificate import verify
+
     verdict = verify(read_artifact(artifact).content(), str(artifact))
     if json:
         print_json(verdict.to_document())

@@ -6,23 +6,21 @@ import sys
 import time
 import webbrowser
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quasilpv.artifact import Artifact, read_artifact
 from quasilpv.cli.console import print_note
 from quasilpv.cli.logs import LogArtifactOption, open_log
+from quasilpv.defaults import DEFAULT_PORT, DEFAULT_URL, LAST
 from quasilpv.errors import InputError, TransportError
-from quasilpv.experiments.logged import mechanism_of
-from quasilpv.scenarios import read_scenario
-from quasilpv.systems.mechanism import PlanarMechanism
-from quasilpv.systems.registry import robot
-from quasilpv.telemetry.listening import DEFAULT_URL
-from quasilpv.telemetry.log import LAST
-from quasilpv.view.live import LiveMotion
-from quasilpv.view.page import DEFAULT_PORT, Page
-from quasilpv.view.playback import Motion, Playback
+
+if TYPE_CHECKING:
+    from quasilpv.artifact import Artifact
+    from quasilpv.systems.mechanism import PlanarMechanism
+    from quasilpv.view.live import LiveMotion
+    from quasilpv.view.page import Page
+    from quasilpv.view.playback import Motion
 
 FRAME_S = 1.0 / 30.0
 
@@ -61,6 +59,12 @@ def view_command(
       design view --log LAST
       design view --live --artifact out/arm3/artifact.json
     """
+    from quasilpv.artifact import read_artifact
+    from quasilpv.experiments.logged import mechanism_of
+    from quasilpv.view.live import LiveMotion
+    from quasilpv.view.page import Page
+    from quasilpv.view.playback import Motion, Playback
+
     listener = None
     if live:
         if artifact is None or log is not None:
@@ -112,6 +116,10 @@ def _first_samples(listener: LiveMotion, url: str, timeout_s: float) -> Motion:
 
 
 def _mechanism(controller: Artifact, scenario: Path | None) -> PlanarMechanism:
+    from quasilpv.experiments.logged import mechanism_of
+    from quasilpv.scenarios import read_scenario
+    from quasilpv.systems.registry import robot
+
     return robot(controller.robot.id).model if scenario is None else mechanism_of(read_scenario(scenario).plant)
 
 

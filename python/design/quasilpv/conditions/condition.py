@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from math import isfinite
 from typing import TypeAlias
 
@@ -12,9 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.conditions.blocks import double_sum, single_sum
+from quasilpv.conditions.choices import Form as Form  # noqa: PLC0414 -- also from here
+from quasilpv.conditions.choices import Slack
 from quasilpv.conditions.gains import DelayedFeedback, DescriptorGain, Gain, ObserverGain, PolytopicGain
 from quasilpv.conditions.reliance import Reliance, Relied, refuse_refuted, reliances
-from quasilpv.conditions.slack import Slack
+from quasilpv.defaults import SAMPLE_PERIOD_S
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.polytopes import PolytopicModel
@@ -22,16 +23,6 @@ from quasilpv.polytopes.units import Units
 
 FloatArray = npt.NDArray[np.float64]
 Values: TypeAlias = Mapping[Variable, FloatArray]
-
-
-class Form(StrEnum):
-    """How a condition is written down."""
-
-    PUBLISHED = "published"
-    """Every unknown and inequality of the source: what its complexity tables count."""
-
-    REDUCED = "reduced"
-    """Equivalent, smaller: unknowns eliminated and inequalities dropped where a proof allows it."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +48,7 @@ class Options:
     form: Form = Form.REDUCED
     window_s: float | None = None
     common: bool = False
-    sample_period_s: float = 0.01
+    sample_period_s: float = SAMPLE_PERIOD_S
 
     def __post_init__(self) -> None:
         """Refuse numbers without a meaning."""

@@ -8,30 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from fractions import Fraction
 from itertools import product
 
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.conditions.choices import Slack as Slack  # noqa: PLC0414 -- also from here
 from quasilpv.lmi import Expression, Variable, zeros
 
 Indices = tuple[int, ...]
 Shares = dict[Variable, Fraction]
-
-
-class Slack(StrEnum):
-    """Which slack matrices a sum is given. The families grow in this order, and so does what they prove."""
-
-    NONE = "none"
-    THESIS = "thesis"
-    """One T_b and one S_b per block b: ``X_ij + T_b(i) + S_b(j) - mean`` (Dehak 2022, Lemma II.1). Only T_b + S_b
-    counts, since X_ij and X_ji appear in one sum."""
-    PAIRS = "pairs"
-    """One T_bc per pair of blocks: ``X_ij + T_b(i),b(j) - (1/G^2) sum_bc T_bc`` (counted in Dehak 2022, Table II.4)."""
-    FULL = "full"
-    """One T_i,b per vertex i and block b: ``X_ij + T_i,b(j) - (1/G) sum_b T_i,b``."""
 
 
 @dataclass(frozen=True, eq=False)

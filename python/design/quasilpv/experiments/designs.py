@@ -13,8 +13,9 @@ from quasilpv.artifact.store import JSON_NAME
 from quasilpv.errors import InputError
 from quasilpv.files import forget_input
 from quasilpv.release import checked_artifact, design_inputs
-from quasilpv.synthesis import Specification, TrackingDesign, synthesise, without_compensation
-from quasilpv.synthesis.acceleration_design import Progress, no_progress
+from quasilpv.synthesis import Specification, synthesise, without_compensation
+from quasilpv.synthesis.progress import Progress, no_progress
+from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.registry import robot
 
 DEFAULT_CACHE = Path("out/cache")

@@ -17,6 +17,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from quasilpv.artifact import Artifact
+from quasilpv.defaults import WATCHDOG_S
 from quasilpv.errors import ClaimError, FaultStop, InputError, PlantError, QuasilpvError, TransportError
 from quasilpv.experiments.fault import Fault, fault_of
 from quasilpv.experiments.result import TrackResult, Variant
@@ -64,8 +65,8 @@ class RealTimeOptions:
         priority: lock memory and use SCHED_FIFO with this priority, 1 to 99; None: normal scheduling.
     """
 
-    silence_s: float = 0.02
-    hold_s: float = 0.02
+    silence_s: float = WATCHDOG_S
+    hold_s: float = WATCHDOG_S
     priority: int | None = None
 
     def of(self, program: str) -> list[str]:

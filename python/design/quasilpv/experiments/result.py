@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from quasilpv.artifact.envelope import OperatingEnvelope
+from quasilpv.defaults import ENCODER_BITS
 from quasilpv.experiments.metrics import Metrics
 from quasilpv.experiments.run import FloatArray, Run
-from quasilpv.scenarios import ENCODER_BITS
 
 
 @dataclass(frozen=True, eq=False)

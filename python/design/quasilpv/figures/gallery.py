@@ -7,10 +7,11 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from quasilpv.defaults import DEFAULT_FORMATS
 from quasilpv.experiments.result import TrackResult
 from quasilpv.figures.comparison import comparison_figure
 from quasilpv.figures.envelope import envelope_figure
-from quasilpv.figures.style import DEFAULT_FORMATS, save
+from quasilpv.figures.style import save
 from quasilpv.figures.tracking import (
     disturbance_figure,
     error_figure,

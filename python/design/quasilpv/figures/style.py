@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from quasilpv.defaults import DEFAULT_FORMATS
 from quasilpv.errors import InputError, one_of
 from quasilpv.files import write_atomically
 
@@ -57,7 +58,6 @@ FORMATS: Mapping[str, Mapping[str, Any]] = {
 }
 """Formats of files. What changes from run to run is left out of the metadata: equal figures are equal files. Of PNG the
 usual compression takes twice the time, for files a tenth smaller."""
-DEFAULT_FORMATS = ("png",)
 
 _PARAMETERS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",

@@ -26,6 +26,7 @@ import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from quasilpv.defaults import DEFAULT_MEMORY_GIB, DEFAULT_TIME_S
 from quasilpv.errors import InputError, QuasilpvError
 
 if TYPE_CHECKING:
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
 IndexArray = npt.NDArray[np.intp]
 
 GIB = 2**30
-
-DEFAULT_TIME_S = 100.0
-DEFAULT_MEMORY_GIB = 4.0
 
 FILL = 2.5
 """What the solver was measured to need over that: 1.5 to 2.8 times on problems of 0.02 to 33 GiB."""

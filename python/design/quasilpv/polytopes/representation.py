@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from quasilpv.defaults import REPRESENTATIONS
 from quasilpv.errors import InputError
 from quasilpv.polytopes.block_polytope import BlockPolytope
 from quasilpv.polytopes.model import PolytopicModel, unknown_premises
 from quasilpv.systems.descriptor import DescriptorSystem
-
-REPRESENTATIONS = ("ts", "rules", "reduced", "per-premise", "uncertain", "grouped=0,1+2")
-"""Forms of a representation's name; numbers are premises, ``+`` joins a group, ``,`` separates groups."""
 
 AT_ZERO = "@0"
 """Suffix that centres blocks at z = 0, as Dehak 2022, (II.10) does, instead of at the centre of the box."""

@@ -9,8 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from quasilpv.defaults import DEFAULT_FORMATS
 from quasilpv.errors import InputError
-from quasilpv.figures.style import DEFAULT_FORMATS, save
+from quasilpv.figures.style import save
 from quasilpv.files import write_atomically, write_readable_json
 from quasilpv.reproduction.item import Effort, Item, ItemResult
 from quasilpv.reproduction.report import markdown_table

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from quasilpv.defaults import ENCODER_BITS
 from quasilpv.experiments.metrics import Metrics
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.closed_loops import Outcome
 from quasilpv.reproduction.item import Check
-from quasilpv.scenarios import ENCODER_BITS, VELOCITY_NOISE_RAD_S
+from quasilpv.scenarios import VELOCITY_NOISE_RAD_S
 from quasilpv.synthesis.baselines import DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S
 
 RATE_HZ = 4000.0

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from quasilpv.conditions.slack import Slack
+from quasilpv.conditions.choices import Slack
+from quasilpv.defaults import DEFAULT_MEMORY_GIB
 from quasilpv.errors import InputError
 from quasilpv.lmi import budget
 from quasilpv.lmi.budget import Limits, Size, TimeUpError, TooLargeError
@@ -81,7 +82,7 @@ def ways(question: Question) -> str:
     with budget.limited(Limits(ALTERNATIVES_S)):
         for words, other in _others(question):
             size = _size(other)
-            allowed = question.limits.memory_gib or budget.DEFAULT_MEMORY_GIB
+            allowed = question.limits.memory_gib or DEFAULT_MEMORY_GIB
             if size is not None and size.memory_gib <= SPARE * allowed:
                 found.append((size, words))
     if not found:

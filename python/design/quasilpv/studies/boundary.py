@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from quasilpv.defaults import RELATIVE_TOLERANCE
 from quasilpv.errors import InputError
 from quasilpv.studies.answer import Answer, Evidence, Verdict
 from quasilpv.studies.question import Question, Sweep
 from quasilpv.systems.catalogue import system_kind
-
-RELATIVE_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)

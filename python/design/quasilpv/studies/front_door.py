@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, TypedDict, Unpack
 
-from quasilpv.conditions.condition import Form, Options
-from quasilpv.conditions.slack import Slack
+from quasilpv.conditions.choices import Form, Slack
+from quasilpv.conditions.condition import Options
+from quasilpv.defaults import RELATIVE_TOLERANCE
 from quasilpv.errors import InputError
 from quasilpv.lmi.budget import DEFAULT, Limits
 from quasilpv.studies.answer import Answer
-from quasilpv.studies.boundary import RELATIVE_TOLERANCE, Boundary, Interval, find_boundary
+from quasilpv.studies.boundary import Boundary, Interval, find_boundary
 from quasilpv.studies.checkpoint import Forgetful
 from quasilpv.studies.engines import in_processes
 from quasilpv.studies.question import Question, answered

@@ -1,22 +1,23 @@
 """From a robot and a specification to the numbers of a tracking law.
 
-A new law is one new file and one entry of `CONTROLLERS`.
+A new law is one new file and one entry of `CONTROLLERS`. The registry is read by help pages: an entry says where its
+design is, which is imported when one is made.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 from quasilpv.errors import InputError, one_of
-from quasilpv.synthesis import baselines, stabilisation, tuned_baselines
-from quasilpv.synthesis.acceleration_design import Progress, no_progress
-from quasilpv.synthesis.acceleration_law import acceleration_law, moving_acceleration_law
-from quasilpv.synthesis.hinf_tracking import hinf_tracking
+from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
-from quasilpv.synthesis.torque_law import premultiplied_torque_law, torque_law
-from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import Robot
+
+if TYPE_CHECKING:
+    from quasilpv.synthesis.tracking_design import TrackingDesign
+    from quasilpv.systems.registry import Robot
 
 
 @dataclass(frozen=True)
@@ -25,64 +26,75 @@ class ControllerKind:
 
     Attributes:
         summary: one line for a listing.
-        design: from robot and specification to a design.
+        function: from robot, specification and progress to a design: ``module.name`` in this room.
         rate_hz: sample rate if nobody asks for another.
     """
 
     summary: str
-    design: Callable[[Robot, Specification, Progress], TrackingDesign]
+    function: str
     rate_hz: float = 1000.0
+
+    def design(self, robot: Robot, specification: Specification, progress: Progress) -> TrackingDesign:
+        """Design it; see `synthesise`."""
+        module, _, name = self.function.rpartition(".")
+        design: Callable[[Robot, Specification, Progress], TrackingDesign]
+        design = getattr(import_module(f"{__name__}.{module}"), name)
+        return design(robot, specification, progress)
 
 
 CONTROLLERS: Mapping[str, ControllerKind] = {
-    "pid": ControllerKind("PID with feedforward, gains of Dehak 2022 (III.55), measured speeds", baselines.pid),
-    "ctc": ControllerKind("computed torque, gains of Dehak 2022 (III.57), measured speeds", baselines.computed_torque),
+    "pid": ControllerKind("PID with feedforward, gains of Dehak 2022 (III.55), measured speeds", "baselines.pid"),
+    "ctc": ControllerKind(
+        "computed torque, gains of Dehak 2022 (III.57), measured speeds", "baselines.computed_torque"
+    ),
     "ctc-dob": ControllerKind(
         "computed torque with a disturbance observer (Mohammadi et al. 2013), measured speeds",
-        baselines.computed_torque_with_observer,
+        "baselines.computed_torque_with_observer",
     ),
-    "pid-tuned": ControllerKind("pid, tuned as dob-acceleration is", tuned_baselines.pid_tuned),
-    "ctc-tuned": ControllerKind("ctc, tuned as dob-acceleration is", tuned_baselines.computed_torque_tuned),
+    "pid-tuned": ControllerKind("pid, tuned as dob-acceleration is", "tuned_baselines.pid_tuned"),
+    "ctc-tuned": ControllerKind("ctc, tuned as dob-acceleration is", "tuned_baselines.computed_torque_tuned"),
     "ctc-dob-tuned": ControllerKind(
-        "ctc-dob, tuned as dob-acceleration is", tuned_baselines.computed_torque_with_observer_tuned
+        "ctc-dob, tuned as dob-acceleration is", "tuned_baselines.computed_torque_with_observer_tuned"
     ),
     "hinf-tracking": ControllerKind(
         "H-infinity PI tracking with limited gains (Dehak 2022, Theorem III.10), measured speeds, no feedforward",
-        hinf_tracking,
+        "hinf_tracking.hinf_tracking",
         rate_hz=4000.0,
     ),
     "pdc": ControllerKind(
         "stabilises theta = 0: scheduled state feedback of least gain (Dehak 2022, Theorem I.2), measured speeds",
-        stabilisation.pdc,
+        "stabilisation.pdc",
     ),
     "descriptor": ControllerKind(
         "stabilises theta = 0: descriptor law of least gain (Dehak 2022, Theorem II.6), measured speeds",
-        stabilisation.descriptor,
+        "stabilisation.descriptor",
         rate_hz=4000.0,
     ),
     "robust": ControllerKind(
         "stabilises theta = 0 with unknown inertia: feedback of least gain (Dehak 2022, Theorem III.9), speeds too",
-        stabilisation.robust,
+        "stabilisation.robust",
     ),
     "delayed": ControllerKind(
         "stabilises theta = 0: descriptor law with a moving window (Dehak 2022, Theorem II.8), measured speeds",
-        stabilisation.delayed,
+        "stabilisation.delayed",
     ),
     "dob-torque": ControllerKind(
         "disturbance-observer tracking at the torque level (Dehak 2022, Theorem IV.11), positions only",
-        torque_law,
+        "torque_law.torque_law",
         rate_hz=4000.0,
     ),
     "dob-torque-premultiplied": ControllerKind(
         "dob-torque for the equations of motion times the robot's own matrix beta (Dehak 2022, IV.5.2)",
-        premultiplied_torque_law,
+        "torque_law.premultiplied_torque_law",
         rate_hz=4000.0,
     ),
     "dob-moving": ControllerKind(
-        "dob-acceleration with one Lyapunov function for all motions, proved; positions only", moving_acceleration_law
+        "dob-acceleration with one Lyapunov function for all motions, proved; positions only",
+        "acceleration_law.moving_acceleration_law",
     ),
     "dob-acceleration": ControllerKind(
-        "disturbance-observer tracking at the acceleration level, positions only (default)", acceleration_law
+        "disturbance-observer tracking at the acceleration level, positions only (default)",
+        "acceleration_law.acceleration_law",
     ),
 }
 
@@ -92,7 +104,6 @@ __all__ = [
     "CONTROLLERS",
     "DEFAULT_CONTROLLER",
     "Specification",
-    "TrackingDesign",
     "controller_kind",
     "specification_for",
     "synthesise",

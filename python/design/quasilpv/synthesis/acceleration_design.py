@@ -9,7 +9,7 @@ inertia ``M_n = s M_nominal``. The scale costs nothing to optimise: the admissib
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -21,6 +21,7 @@ from quasilpv.errors import InfeasibleError
 from quasilpv.synthesis.inertia_range import InertiaRange, largest_inertia_norm, needed_inertia_range
 from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.synthesis.moving_inertia import InertiaDisc, needed_disc
+from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.sampled_loop import AccelerationLaw, SampledLoop
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tolerance import FrozenTolerance, MovingTolerance, Tolerance
@@ -34,12 +35,6 @@ REFINEMENTS = 2
 NEIGHBOURS = 3**3 - 1
 LARGEST_SEARCH = len(FEEDBACK_BANDWIDTHS) * len(OBSERVER_BANDWIDTHS) * len(FILTER_TIMES) + REFINEMENTS * NEIGHBOURS
 INTERIOR_RATIOS = 5
-
-Progress = Callable[[int, int], None]
-
-
-def no_progress(done: int, total: int) -> None:
-    """Report nothing."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,10 @@ from dataclasses import replace
 from typing import Any
 
 from quasilpv.conditions.sampled_chains import ChainGains
-from quasilpv.synthesis.acceleration_design import AccelerationDesign, Progress, design_acceleration_law, no_progress
+from quasilpv.synthesis.acceleration_design import AccelerationDesign, design_acceleration_law
 from quasilpv.synthesis.moving_lyapunov import MovingLyapunov, moving_lyapunov
 from quasilpv.synthesis.operating_envelope import acceleration_envelope
+from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.registry import Robot

@@ -26,9 +26,9 @@ from quasilpv.errors import InfeasibleError
 from quasilpv.loops.hinf_law import hinf_tracking_law
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.velocity_law import VelocityLaw
-from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.synthesis.plant_grid import PlantGrid
+from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
 from quasilpv.synthesis.torque_schedule import ScheduledPlants, full_schedule
 from quasilpv.synthesis.tracking_design import TrackingDesign

@@ -23,7 +23,7 @@ from quasilpv.errors import InfeasibleError
 from quasilpv.loops.loop_grid import PAYLOAD_FRACTIONS, LoopGrid, configurations
 from quasilpv.loops.state_law import StateLaw
 from quasilpv.polytopes import BlockPolytope, PolytopicModel
-from quasilpv.synthesis.acceleration_design import Progress
+from quasilpv.synthesis.progress import Progress
 from quasilpv.synthesis.robust_feedback import robust_solver
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.stabilising_gains import (

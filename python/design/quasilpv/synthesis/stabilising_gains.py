@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.conditions import i2, ii6
-from quasilpv.conditions.condition import Form, Options, Statement
+from quasilpv.conditions.choices import Form
+from quasilpv.conditions.condition import Options, Statement
 from quasilpv.conditions.ii8_direct import delayed_design
 from quasilpv.lmi import Problem, Solution, Variable, block
 from quasilpv.loops.state_law import descriptor_gain

@@ -23,9 +23,9 @@ import numpy.typing as npt
 from quasilpv.conditions.iv11_reduced import FeedbackPoint, ObserverPoint, feedback_condition, observer_condition
 from quasilpv.errors import InfeasibleError
 from quasilpv.lmi import to_rational
-from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.synthesis.plant_grid import PlantGrid
+from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.torque_schedule import ScheduledLaw, ScheduledPlants, schedule
 from quasilpv.systems.registry import Robot

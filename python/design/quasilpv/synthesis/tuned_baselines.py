@@ -24,7 +24,6 @@ import numpy.typing as npt
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.velocity_law import VelocityLaw
-from quasilpv.synthesis.acceleration_design import Progress, no_progress
 from quasilpv.synthesis.baselines import (
     Tuning,
     computed_torque_design,
@@ -32,6 +31,7 @@ from quasilpv.synthesis.baselines import (
     stretched_inertia,
 )
 from quasilpv.synthesis.plant_grid import PlantGrid
+from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.synthesis.tuning_search import Axes, Candidate, TuningSearch

@@ -19,9 +19,9 @@ import scipy.optimize
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.velocity_law import VelocityLaw
 from quasilpv.synthesis import acceleration_design
-from quasilpv.synthesis.acceleration_design import Progress
 from quasilpv.synthesis.baselines import Tuning
 from quasilpv.synthesis.plant_grid import PlantGrid
+from quasilpv.synthesis.progress import Progress
 from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
 from quasilpv.systems.registry import Robot
 

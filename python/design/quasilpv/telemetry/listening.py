@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import lcm
 
+from quasilpv.defaults import DEFAULT_URL
 from quasilpv.errors import InputError, TransportError
 from quasilpv.telemetry.message_types import CHANNELS, channel_type
 
-DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0"
 _RECEIVE_BUFFER_BYTES = 4 << 20
 """Asked of the kernel, whose default holds a hundred messages: fewer than a busy machine lets pile up."""
 _URL = re.compile(r"udpm://\d+(\.\d+){3}:\d+\?ttl=0")

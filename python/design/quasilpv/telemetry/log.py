@@ -22,6 +22,7 @@ from pydantic import Field
 from quasilpv.artifact import Artifact
 from quasilpv.artifact.canonical import canonical_json, parse_document, parse_strict_json
 from quasilpv.artifact.strict_model import StrictModel, validate
+from quasilpv.defaults import LAST
 from quasilpv.errors import InputError
 from quasilpv.files import write_atomically
 from quasilpv.scenarios import Scenario
@@ -32,7 +33,6 @@ from quasilpv.trajectories import Trajectory
 Mode: TypeAlias = Literal["in-process", "lockstep", "realtime"]
 
 LOG_NAME = f"run{SUFFIX}"
-LAST = "LAST"
 RUNS_FOLDER = Path("out")
 POINTER_NAME = "last-log"
 """In `RUNS_FOLDER`: the path of the log of the last run, wherever that was written."""

@@ -20,7 +20,6 @@ from quasilpv.view.robot_scene import RobotScene
 from quasilpv.view.same_origin import same_origin_only
 
 HOST = "127.0.0.1"
-DEFAULT_PORT = 8080
 PLOT_PERIOD_S = 0.12
 _PANEL_WIDTH = 400
 _PLOT_HEIGHT = 104
