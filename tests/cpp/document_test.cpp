@@ -323,7 +323,7 @@ TEST(Field, names_source_path_got_and_expected) {
   const Field root(document, "a.json", "");
   const Field gains = root["law"]["gains"];
   EXPECT_EQ(refusal([&] { (void)gains.at(1).number(); }),
-            "a.json: law.gains[1]: got \"two\", expected a finite number");
+            "a.json: law.gains[1]: got \"two\", expected a finite number of at most 1e+100 in magnitude");
   EXPECT_EQ(refusal([&] { (void)root["law"]["order"].integer(0, 9); }),
             "a.json: law.order: got 3.7, expected an integer in [0, 9]");
   EXPECT_EQ(refusal([&] { (void)root["law"]["missing"]; }), "a.json: law.missing: got nothing, expected this member");

@@ -168,6 +168,10 @@ const std::vector<BrokenRule> kBrokenRules{
     {"/name", "", "name"},
     {"/duration_s", 0.0, "duration_s"},
     {"/duration_s", "3", "duration_s"},
+    {"/duration_s", 1e15, "duration_s"},
+    {"/integrator/relative_tolerance", 1e300, "integrator.relative_tolerance"},
+    {"/plant/links/0/length_m", 1e-300, "plant.links[0].length_m"},
+    {"/external_torque/0/amplitude_nm", 1e300, "external_torque[0].amplitude_nm"},
     {"/comment", "hello", "comment"},
     {"/plant/kind", "five-link", "plant.kind"},
     {"/plant/gravity_m_s2", nullptr, "plant.gravity_m_s2"},
@@ -251,6 +255,10 @@ TEST(Scenario, when_a_key_is_given_twice_expect_refusal) {
   std::string text = valid_document().dump();
   text.insert(1, R"("name": "other", )");
   EXPECT_THROW(Scenario::parse(text, "swing.json"), InputError);
+}
+
+TEST(Scenario, when_it_begins_with_a_byte_order_mark_expect_refusal) {
+  EXPECT_THROW(Scenario::parse("\xEF\xBB\xBF" + valid_document().dump(), "swing.json"), InputError);
 }
 
 TEST(Scenario, when_the_file_is_missing_expect_an_input_error) {

@@ -8,6 +8,8 @@
 namespace quasilpv {
 namespace {
 
+constexpr double kShortestPeriodS = 1e-6;
+constexpr double kLongestPeriodS = 10.0;
 constexpr double kSymmetryTolerance = 1e-12;      // relative to the largest entry
 constexpr double kDefinitenessTolerance = 1e-12;  // smallest over largest eigenvalue
 
@@ -32,13 +34,16 @@ std::string hex_digits(const Field& field, std::size_t count) {
   return text;
 }
 
-JointArray joint_values(const Field& field, int joints, double (Field::*read)() const) {
+double any_number(const Field& field) { return field.number(); }
+
+template <class Read>
+JointArray joint_values(const Field& field, int joints, Read read) {
   if (field.size() != static_cast<std::size_t>(joints)) {
     field.fail("an array of " + std::to_string(field.size()), std::to_string(joints) + " values, one per joint");
   }
   JointArray values{};
   for (std::size_t j = 0; j < field.size(); ++j) {
-    values[j] = (field.at(j).*read)();
+    values[j] = read(field.at(j));
   }
   return values;
 }
@@ -245,9 +250,9 @@ PidParameters parse_pid(const Field& law, const Field& programs, int joints) {
   law.only({"kind", "kp", "kd", "ki", "velocity_filter_time_constant_s", "inertia"});
   PidParameters parameters{parse_model(law, programs, joints),
                            Program::parse(programs["coriolis_reference"], {joints, true, true}, joints)};
-  parameters.kp = joint_values(law["kp"], joints, &Field::number);
-  parameters.kd = joint_values(law["kd"], joints, &Field::number);
-  parameters.ki = joint_values(law["ki"], joints, &Field::number);
+  parameters.kp = joint_values(law["kp"], joints, any_number);
+  parameters.kd = joint_values(law["kd"], joints, any_number);
+  parameters.ki = joint_values(law["ki"], joints, any_number);
   parameters.velocity_filter_time_constant_s = law["velocity_filter_time_constant_s"].non_negative();
   return parameters;
 }
@@ -258,9 +263,9 @@ ComputedTorqueParameters parse_computed_torque(const Field& law, const Field& pr
       {"kind", "gp", "gd", "gi", "velocity_filter_time_constant_s", "disturbance_observer_bandwidth_rad_s", "inertia"});
   ComputedTorqueParameters parameters{parse_model(law, programs, joints),
                                       Program::parse(programs["coriolis"], {joints, true, false}, joints)};
-  parameters.gp = joint_values(law["gp"], joints, &Field::number);
-  parameters.gd = joint_values(law["gd"], joints, &Field::number);
-  parameters.gi = joint_values(law["gi"], joints, &Field::number);
+  parameters.gp = joint_values(law["gp"], joints, any_number);
+  parameters.gd = joint_values(law["gd"], joints, any_number);
+  parameters.gi = joint_values(law["gi"], joints, any_number);
   parameters.velocity_filter_time_constant_s = law["velocity_filter_time_constant_s"].non_negative();
   const Field bandwidth = law["disturbance_observer_bandwidth_rad_s"];
   parameters.disturbance_observer_bandwidth_rad_s = bandwidth.non_negative();
@@ -299,7 +304,7 @@ void Artifact::parse_header(const Field& root) {
   (void)creator["version"].text();
   design_hash_ = hex_digits(root["design_hash"], 64);
   root["units"].expect_text("SI");
-  sample_period_s_ = root["sample_period_s"].positive();
+  sample_period_s_ = root["sample_period_s"].positive(kShortestPeriodS, kLongestPeriodS);
   joints_ = static_cast<int>(root["joints"].integer(1, kMaxJoints));
   const Field robot = root["robot"];
   robot.only({"id", "parameters"});
@@ -317,8 +322,10 @@ void Artifact::parse_limits(const Field& root) {
   domain_.speed_rad_s = intervals(domain["speed_rad_s"], joints_);
   const Field limits = root["limits"];
   limits.only({"torque_nm", "slew_nm_per_s"});
-  limits_.torque_nm = joint_values(limits["torque_nm"], joints_, &Field::positive);
-  limits_.slew_nm_per_s = joint_values(limits["slew_nm_per_s"], joints_, &Field::positive);
+  const auto torque = [](const Field& field) { return field.positive(1.0 / kLargestTorqueNm, kLargestTorqueNm); };
+  limits_.torque_nm = joint_values(limits["torque_nm"], joints_, torque);
+  limits_.slew_nm_per_s =
+      joint_values(limits["slew_nm_per_s"], joints_, [](const Field& field) { return field.positive(); });
 }
 
 void Artifact::parse_law(const Field& law, const Field& programs) {

@@ -78,25 +78,25 @@ std::size_t Field::size() const {
   return value_->size();
 }
 
-double Field::number() const {
-  if (!value_->is_number() || !std::isfinite(value_->get<double>())) {
-    fail(shown(*value_), "a finite number");
+double Field::within(double low, double high, const std::string& expected) const {
+  const double value = value_->is_number() ? value_->get<double>() : std::nan("");
+  if (!(low <= value && value <= high)) {
+    fail(shown(*value_), expected);
   }
-  return value_->get<double>();
+  return value;
 }
 
-double Field::positive() const {
-  if (!value_->is_number() || !std::isfinite(value_->get<double>()) || value_->get<double>() <= 0.0) {
-    fail(shown(*value_), "a number > 0");
-  }
-  return value_->get<double>();
+double Field::number(double largest) const {
+  return within(-largest, largest, "a finite number of at most " + canonical_number(largest) + " in magnitude");
 }
 
-double Field::non_negative() const {
-  if (!value_->is_number() || !std::isfinite(value_->get<double>()) || value_->get<double>() < 0.0) {
-    fail(shown(*value_), "a number >= 0");
-  }
-  return value_->get<double>();
+double Field::positive(double smallest, double largest) const {
+  return within(smallest, largest,
+                "a number > 0, from " + canonical_number(smallest) + " to " + canonical_number(largest));
+}
+
+double Field::non_negative(double largest) const {
+  return within(0.0, largest, "a number >= 0 of at most " + canonical_number(largest));
 }
 
 std::int64_t Field::integer(std::int64_t low, std::int64_t high) const {
@@ -122,13 +122,13 @@ std::string Field::text() const {
   return value_->get<std::string>();
 }
 
-std::vector<double> Field::numbers(std::size_t expected_size) const {
+std::vector<double> Field::numbers(std::size_t expected_size, double largest) const {
   if (!value_->is_array() || value_->size() != expected_size) {
     fail(shown(*value_), "an array of " + std::to_string(expected_size) + " numbers");
   }
   std::vector<double> values(expected_size);
   for (std::size_t i = 0; i < expected_size; ++i) {
-    values[i] = at(i).number();
+    values[i] = at(i).number(largest);
   }
   return values;
 }

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "quasilpv/decimal.hpp"
+#include "quasilpv/limiter.hpp"
 #include "quasilpv/realtime.hpp"
 #include "quasilpv/run_columns.hpp"
 #include "quasilpv/watchdog.hpp"
@@ -16,7 +17,6 @@ namespace {
 constexpr std::int64_t kRepeatPeriodNs = 50 * kNanosecondsPerMillisecond;
 constexpr std::int64_t kLongestWaitNs = 10 * kNanosecondsPerMillisecond;
 constexpr double kNoCommand = -1.0;
-constexpr double kLargestTorqueNm = 1e12;  // without a limit of the artifact
 
 JointArray to_array(const double (&source)[kMaxJoints]) {
   JointArray target;

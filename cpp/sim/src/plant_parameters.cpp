@@ -6,10 +6,16 @@
 namespace quasilpv {
 namespace {
 
+/// What must be positive: check_link() and its like say so, and why.
+double size(const Field& field) {
+  const double value = field.number();
+  return value > 0.0 ? field.positive() : value;
+}
+
 PlanarLink link(const Field& field) {
   field.only({"length_m", "mass_kg", "com_m", "inertia_kg_m2", "friction_nm_s"});
-  return {field["length_m"].number(), field["mass_kg"].number(), field["com_m"].number(),
-          field["inertia_kg_m2"].number(), field["friction_nm_s"].number()};
+  return {size(field["length_m"]), size(field["mass_kg"]), field["com_m"].number(), size(field["inertia_kg_m2"]),
+          field["friction_nm_s"].number()};
 }
 
 SerialArmParameters serial_arm(const Field& field, const std::string& source) {
@@ -58,9 +64,9 @@ SpringDiscParameters spring_disc(const Field& field, const std::string& source) 
               "cubic_stiffness_n_m3", "damping_n_s_m"});
   SpringDiscParameters disc;
   disc.label = field["label"].text();
-  disc.mass_kg = field["mass_kg"].number();
-  disc.radius_m = field["radius_m"].number();
-  disc.inertia_kg_m2 = field["inertia_kg_m2"].number();
+  disc.mass_kg = size(field["mass_kg"]);
+  disc.radius_m = size(field["radius_m"]);
+  disc.inertia_kg_m2 = size(field["inertia_kg_m2"]);
   disc.inertia_uncertainty_per_kg = field["inertia_uncertainty_per_kg"].number();
   disc.stiffness_n_m = field["stiffness_n_m"].number();
   disc.cubic_stiffness_n_m3 = field["cubic_stiffness_n_m3"].number();

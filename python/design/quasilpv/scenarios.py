@@ -27,7 +27,7 @@ from quasilpv.artifact.canonical import (
     require_bounded,
 )
 from quasilpv.artifact.programs import MAX_JOINTS
-from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
+from quasilpv.artifact.strict_model import LARGEST_NUMBER, FieldError, NonNegative, Positive, StrictModel, validate
 from quasilpv.defaults import ENCODER_BITS
 from quasilpv.errors import InputError, one_of
 from quasilpv.files import read_bytes, write_readable_json
@@ -37,10 +37,8 @@ from quasilpv.systems.registry import Robot
 from quasilpv.trajectories import Trajectory, fivebar_spiral, rest, serial_circle, serial_square
 from quasilpv.trajectories.planning import Kinematics
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
-Tolerance = Annotated[float, Field(gt=0, le=0.1)]
-Duration = Annotated[float, Field(gt=0, le=86400)]
+Tolerance = Annotated[float, Field(ge=1.0 / LARGEST_NUMBER, le=0.1)]
+Duration = Annotated[float, Field(ge=1.0 / LARGEST_NUMBER, le=86400)]
 Delay = Annotated[float, Field(ge=0, le=10)]
 Vector = tuple[float, ...]
 

@@ -11,6 +11,10 @@ namespace quasilpv {
 
 using Json = nlohmann::json;
 
+/// No number that is read from a document is larger, and no positive one smaller than its reciprocal: products of a few
+/// of them are finite.
+inline constexpr double kLargestReadNumber = 1e100;
+
 /// A number as RFC 8785 writes it (ECMAScript, shortest round trip). INIT-ONLY.
 std::string canonical_number(double value);
 
@@ -56,17 +60,22 @@ class Field {
   bool has(const std::string& key) const;
   bool is_null() const;
 
-  std::size_t size() const;     ///< of an array
-  double number() const;        ///< finite
-  double positive() const;      ///< finite and > 0
-  double non_negative() const;  ///< finite and >= 0
+  std::size_t size() const;  ///< of an array
+  /// A number of at most `largest` in magnitude.
+  double number(double largest = kLargestReadNumber) const;
+  /// From `smallest` to `largest`.
+  double positive(double smallest = 1.0 / kLargestReadNumber, double largest = kLargestReadNumber) const;
+  /// From 0 to `largest`.
+  double non_negative(double largest = kLargestReadNumber) const;
   bool boolean() const;
   std::int64_t integer(std::int64_t low, std::int64_t high) const;
   std::string text() const;
-  std::vector<double> numbers(std::size_t expected_size) const;
+  std::vector<double> numbers(std::size_t expected_size, double largest = kLargestReadNumber) const;
   void expect_text(const std::string& expected) const;
 
  private:
+  double within(double low, double high, const std::string& expected) const;
+
   const Json* value_;
   std::string source_;
   std::string path_;

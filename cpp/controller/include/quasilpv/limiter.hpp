@@ -7,6 +7,9 @@
 
 namespace quasilpv {
 
+/// No torque is larger: no limit of an artifact, and at the plant no command.
+inline constexpr double kLargestTorqueNm = 1e12;
+
 /// Limits of one arm, all > 0; entries from the number of joints on are unused.
 struct TorqueLimits {
   JointArray torque_nm{};

@@ -6,11 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from quasilpv.artifact.strict_model import FieldError, StrictModel
+from quasilpv.artifact.strict_model import FieldError, NonNegative, Number, Positive, StrictModel
 from quasilpv.artifact.tables import Matrix, PolytopeTable, Vector, require_lyapunov, require_shape, require_size
-
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
 
 MIN_WINDOW_SAMPLES = 5
 """A shorter moving window has no mean to speak of; 0 stands for its limit."""
@@ -25,9 +22,9 @@ MAX_DELAYED_VERTICES = 16
 class Feedback(StrictModel):
     """Acceleration-level feedback ``kp e + kd e' + ki int e`` with e = x - x_r: stabilising gains are negative."""
 
-    kp: float
-    kd: float
-    ki: float
+    kp: Number
+    kd: Number
+    ki: Number
 
 
 class _Law(StrictModel):
@@ -98,7 +95,7 @@ class DobAccelerationLaw(_OptionalMemberLaw):
 
     kind: Literal["dob-acceleration"]
     feedback: Feedback
-    observer: tuple[float, float, float, float]
+    observer: tuple[Number, Number, Number, Number]
     filter_time_constant_s: Positive
     disturbance_compensation: bool
     lyapunov_bound: LyapunovBound | None = None

@@ -7,7 +7,6 @@ the order of the list on a stack of at most ``MAX_STACK`` values; what remains o
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
@@ -16,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.strict_model import FieldError, StrictModel
+from quasilpv.artifact.strict_model import LARGEST_NUMBER, FieldError, StrictModel
 from quasilpv.errors import InputError
 
 MAX_STACK = 64
@@ -76,7 +75,7 @@ OPERATIONS: Mapping[str, Operation] = {
 
 
 _ARGUMENTS: Mapping[str, tuple[tuple[type, ...], float, float, str]] = {
-    "number": ((int, float), -sys.float_info.max, sys.float_info.max, "one finite number as argument"),
+    "number": ((int, float), -LARGEST_NUMBER, LARGEST_NUMBER, f"one number of at most {LARGEST_NUMBER:g} as argument"),
     "joint": ((int,), 0, MAX_JOINTS - 1, f"one joint index from 0 to {MAX_JOINTS - 1} as argument"),
     "power": ((int,), 1, MAX_POWER, f"one integer exponent from 1 to {MAX_POWER} as argument"),
 }

@@ -12,12 +12,14 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from quasilpv.artifact.canonical import Document, document_hash, with_hash
-from quasilpv.artifact.laws import Law, Positive
+from quasilpv.artifact.laws import Law
 from quasilpv.artifact.programs import MAX_JOINTS, Program
-from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
+from quasilpv.artifact.strict_model import FieldError, Number, Positive, StrictModel, validate
 from quasilpv.artifact.tables import require_size
 
-Interval = tuple[float, float]
+Interval = tuple[Number, Number]
+LARGEST_TORQUE_NM = 1e12
+SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 1e-6, 10.0
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Name = Annotated[str, Field(min_length=1)]
 
@@ -54,7 +56,7 @@ class Domain(StrictModel):
 class Limits(StrictModel):
     """Torque limit, N m, and slew limit, N m/s, per joint."""
 
-    torque_nm: tuple[Positive, ...]
+    torque_nm: tuple[Annotated[float, Field(ge=1.0 / LARGEST_TORQUE_NM, le=LARGEST_TORQUE_NM)], ...]
     slew_nm_per_s: tuple[Positive, ...]
 
 
@@ -91,7 +93,7 @@ class Artifact(StrictModel):
     creator: Creator
     design_hash: Sha256
     units: Literal["SI"]
-    sample_period_s: Positive
+    sample_period_s: float = Field(ge=SHORTEST_PERIOD_S, le=LONGEST_PERIOD_S)
     joints: int = Field(ge=1, le=MAX_JOINTS)
     robot: Robot
     payloads: dict[str, Any]

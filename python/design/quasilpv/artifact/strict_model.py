@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from quasilpv.artifact.canonical import canonical_json, member_path
 from quasilpv.errors import InputError
+
+LARGEST_NUMBER = 1e100
+"""No number that is read at run time is larger, and no positive one smaller than its reciprocal."""
+
+Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
+Positive = Annotated[float, Field(ge=1.0 / LARGEST_NUMBER, le=LARGEST_NUMBER)]
+NonNegative = Annotated[float, Field(ge=0, le=LARGEST_NUMBER)]
 
 
 class StrictModel(BaseModel):

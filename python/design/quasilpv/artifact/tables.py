@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.strict_model import FieldError, StrictModel
+from quasilpv.artifact.strict_model import FieldError, Number, StrictModel
 
 MAX_PREMISES = 32
 ROUNDING = 1e-12
 
-Vector = tuple[float, ...]
+Vector = tuple[Number, ...]
 Matrix = tuple[Vector, ...]
 
 
@@ -39,9 +39,11 @@ class PolytopeTable(StrictModel):
     def _check_partition(self) -> Self:
         for field in ("lower", "upper", "centre"):
             require_size(field, getattr(self, field), self.premises)
-        for i, (lower, upper) in enumerate(zip(self.lower, self.upper, strict=True)):
+        for i, (lower, centre, upper) in enumerate(zip(self.lower, self.centre, self.upper, strict=True)):
             if not lower < upper:
                 raise FieldError(f"upper[{i}]", upper, f"more than lower[{i}] = {lower}")
+            if not lower <= centre <= upper:
+                raise FieldError(f"centre[{i}]", centre, "a point of the box")
         listed = [premise for block in self.blocks for premise in block.premises]
         if sorted(listed) != list(range(self.premises)):
             raise FieldError("blocks", f"premises {listed}", f"each of 0 to {self.premises - 1} in exactly one block")

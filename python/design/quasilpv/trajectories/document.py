@@ -21,12 +21,12 @@ from quasilpv.artifact.canonical import (
     with_hash,
 )
 from quasilpv.artifact.programs import MAX_JOINTS
-from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
+from quasilpv.artifact.strict_model import FieldError, Number, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import read_bytes, write_atomically
 
 Array = npt.NDArray[np.float64]
-Quintic = tuple[float, float, float, float, float, float]
+Quintic = tuple[Number, Number, Number, Number, Number, Number]
 
 CONTINUITY_TOLERANCE = 1e-9
 
@@ -47,7 +47,7 @@ class TrajectoryModel(StrictModel):
     name: Annotated[str, Field(min_length=1)]
     joints: int = Field(ge=1, le=MAX_JOINTS)
     task: dict[str, Any] | None
-    knots_s: Annotated[tuple[float, ...], Field(min_length=2)]
+    knots_s: Annotated[tuple[Number, ...], Field(min_length=2)]
     coefficients: tuple[tuple[Quintic, ...], ...]
 
     @model_validator(mode="after")
@@ -159,7 +159,8 @@ class Trajectory:
         c = np.moveaxis(self.coefficients, -1, 0)
         derivatives = {"r": [1.0] * 6, "r'": [0.0, 1, 2, 3, 4, 5], "r''": [0.0, 0, 2, 6, 12, 20]}
         for order, (name, factors) in enumerate(derivatives.items()):
-            ends = sum(factors[i] * c[i] * h ** (i - order) for i in range(order, 6))
+            with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is a jump
+                ends = sum(factors[i] * c[i] * h ** (i - order) for i in range(order, 6))
             starts = factors[order] * c[order]
             scale = np.maximum(1.0, np.maximum(np.abs(starts[1:]), np.abs(ends[:-1])))
             jumps = np.abs(starts[1:] - ends[:-1]) / scale
