@@ -1,7 +1,9 @@
 // A controller with its driver in one process: hardware_driver ARTIFACT TRAJECTORY SECONDS
 #include <exception>
 #include <iostream>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "drive_robot.hpp"
 #include "quasilpv/decimal.hpp"
@@ -26,7 +28,9 @@ int run(const std::string& artifact_path, const std::string& trajectory_path, do
   settings.bumpless_start = true;
   settings.realtime = enter_realtime(kPriority).complete();
   ControlLoop loop(artifact, trajectory, settings);
-  TelemetryPublisher telemetry(nullptr, period_s, artifact.joints(), "hardware_driver.csv");
+  TelemetryPublisher telemetry(nullptr, period_s, artifact.joints(),
+                               std::make_unique<OutputFile>("hardware_driver.csv", "record", "hardware_driver",
+                                                            std::vector{artifact_path, trajectory_path}));
   loop.publish_to(&telemetry.ring());
 
   const Reference start = trajectory.evaluate(0.0);

@@ -136,7 +136,7 @@ TEST_F(Lock, is_not_taken_by_the_control_thread_of_any_law_whatever_the_robot_do
   for (const char* kind : kLawKinds) {
     for (const Pace pace : kPaces) {
       ControlLoop loop = make_loop(kind);
-      TelemetryPublisher publisher(nullptr, loop.sample_period_s(), loop.joints(), "");
+      TelemetryPublisher publisher(nullptr, loop.sample_period_s(), loop.joints(), nullptr);
       loop.publish_to(&publisher.ring());
       QuietRobot robot;
       ControllerRunReport report;

@@ -25,7 +25,7 @@ TEST(Record, csv_heads_single_columns_by_name_and_joint_columns_by_index) {
   std::ostringstream out;
   CsvWriter csv(out);
   record.write_csv(csv);
-  EXPECT_TRUE(csv.close());
+  EXPECT_TRUE(out.good());
   EXPECT_EQ(out.str(), "time_s,angle_rad_0,angle_rad_1\n0,0.5,-0.25\n0.001,1,2\n");
 }
 

@@ -1,6 +1,6 @@
 """The command lines of both executables: every option that --help lists, with every value that is none of its type.
 
-And what both do with standard streams, records and stacks that cannot take what they are asked for.
+And what both do with standard streams and stacks that cannot take what they are asked for.
 """
 
 from __future__ import annotations
@@ -155,19 +155,6 @@ def test_when_the_reader_of_the_report_left_expect_exit_141_and_the_record(exper
     assert plant.returncode == 141
     assert finish(controller)[0] == 0
     assert len(experiment.columns("plant.csv")["seq"]) == 300
-
-
-def test_when_the_record_does_not_fit_expect_a_line_and_the_report(experiment: Experiment) -> None:
-    commands = [experiment.controller_command(), experiment.simulator_command()]
-    for command in commands:
-        command[command.index("--record") + 1] = "/dev/full"
-    controller, plant = (experiment.start(command) for command in commands)
-    code, report, errors = finish(plant)
-    assert (code, report["samples"], len(errors.splitlines())) == (2, 300, 1), errors
-    assert "/dev/full" in errors
-    code, report, errors = finish(controller)
-    assert (code, report["steps"], len(errors.splitlines())) == (0, 300, 1), errors
-    assert f"/dev/full: {report['telemetry']['record_drops']} rows of the record were lost" in errors
 
 
 @every_command

@@ -218,9 +218,8 @@ def test_F15_when_the_disk_is_full_and_the_listener_stuck_expect_the_same_run_an
 
     stuck = lcm.LCM(experiment.url)  # subscribes, and never takes anything out of its socket
     stuck.subscribe("QLPV_TELEMETRY", lambda *_: None)
-    command = experiment.controller_command()
-    command[command.index("--record") + 1] = "/dev/full"
-    controller = experiment.start(command)
+    full = ["bash", "-c", 'ulimit -f 16; exec "$@"', "-"]  # no file holds more than 16 KiB
+    controller = experiment.start([*full, *experiment.controller_command()])
     assert experiment.run(experiment.simulator_command())[0] == 0
     code, report, _ = finish(controller)
     assert code == 0
@@ -229,7 +228,7 @@ def test_F15_when_the_disk_is_full_and_the_listener_stuck_expect_the_same_run_an
     assert report["telemetry"]["published"] == SAMPLES
 
 
-@pytest.mark.parametrize("request_stop", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("request_stop", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_F16_when_the_controller_is_asked_to_stop_expect_safe_torque_record_and_exit_0(
     experiment: Experiment, request_stop: signal.Signals
 ) -> None:

@@ -1,6 +1,7 @@
 // qlpv-controller: one artifact, one trajectory, one run over LCM; a doctor; a reset. Contract:
 // docs/reference/messages.md
 #include <algorithm>
+#include <atomic>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -104,6 +105,8 @@ int run(const CLI::App& app, Options& options) {
   const CommonOptions& common = options.common;
   const Artifact artifact = Artifact::load(common.artifact);
   const Trajectory trajectory = Trajectory::load(options.trajectory);
+  const std::atomic<bool>& stop = install_stop_signals();
+  std::unique_ptr<OutputFile> record = open_record(common, "qlpv-controller", options.trajectory);
   options.loop.realtime = apply_priority(app, common);
   // In lock-step a run is the run in process, bit for bit; there is no arm that a bump could harm.
   options.loop.bumpless_start = common.pace == Pace::kRealTime;
@@ -114,13 +117,14 @@ int run(const CLI::App& app, Options& options) {
   apply_key(common, link);
   auto telemetry_link =
       std::make_unique<LcmLink>(Side::kController, identity, common.url, common.allow_network, Listen::kNothing);
-  TelemetryPublisher publisher(std::move(telemetry_link), artifact.sample_period_s(), artifact.joints(), common.record);
+  TelemetryPublisher publisher(std::move(telemetry_link), artifact.sample_period_s(), artifact.joints(),
+                               std::move(record));
 
   options.run.pace = common.pace;
   options.run.timeout_s = common.timeout_s;
   loop.publish_to(&publisher.ring());
   LinkRobot robot(link);
-  const ControllerRunReport report = run_controller(loop, robot, options.run, install_stop_signals());
+  const ControllerRunReport report = run_controller(loop, robot, options.run, stop);
   const TelemetryReport telemetry = publisher.stop();
   print_report(std::cout, describe(loop, report, telemetry, link, options.loop.realtime), common.json);
   if (telemetry.record_drops > 0) {

@@ -2,9 +2,6 @@
 
 #include <array>
 #include <charconv>
-#include <cstring>
-
-#include "quasilpv/errors.hpp"
 
 namespace quasilpv {
 namespace {
@@ -18,12 +15,6 @@ void append_number(std::string& row, Number value) {
 }
 
 }  // namespace
-
-CsvWriter::CsvWriter(const std::string& path) : file_(path, std::ios::binary | std::ios::trunc), out_(file_) {
-  if (!file_) {
-    throw InputError(path, "record", std::strerror(errno), "a file that can be written");
-  }
-}
 
 void CsvWriter::head(const std::string& name, int width) {
   for (int i = 0; i < width; ++i) {
@@ -53,16 +44,6 @@ bool CsvWriter::end_row() {
   out_.write(row_.data(), static_cast<std::streamsize>(row_.size()));
   row_.clear();
   return out_.good();
-}
-
-bool CsvWriter::close() {
-  out_.flush();
-  const bool healthy = out_.good();
-  if (!file_.is_open()) {
-    return healthy;
-  }
-  file_.close();
-  return healthy && file_.good();
 }
 
 void CsvWriter::separate() {

@@ -32,6 +32,7 @@ void occupy_closed_streams() {
 void prepare_process() {
   occupy_closed_streams();
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of the write, like a full disk
   rlimit stack{};
   if (getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur != RLIM_INFINITY && stack.rlim_cur < kLeastStackBytes) {
     throw InputError("process", "stack limit", std::to_string(stack.rlim_cur / 1024) + " KiB",

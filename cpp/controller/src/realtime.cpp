@@ -92,6 +92,10 @@ const std::atomic<bool>& install_stop_signals() noexcept {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  struct sigaction hang_up {};
+  if (sigaction(SIGHUP, nullptr, &hang_up) == 0 && hang_up.sa_handler != SIG_IGN) {  // nohup asks to ignore it
+    sigaction(SIGHUP, &action, nullptr);
+  }
   return g_stop_requested;
 }
 

@@ -1,17 +1,19 @@
 #include "quasilpv/telemetry_publisher.hpp"
 
 #include <chrono>
+#include <utility>
 
 #include "quasilpv/realtime.hpp"
 
 namespace quasilpv {
 
 TelemetryPublisher::TelemetryPublisher(std::unique_ptr<Link> link, double sample_period_s, int joints,
-                                       const std::string& record_path)
+                                       std::unique_ptr<OutputFile> record)
     : link_(std::move(link)),
       sample_period_s_(sample_period_s),
       joints_(joints),
-      record_(record_path.empty() ? nullptr : std::make_unique<CsvWriter>(record_path)),
+      record_(std::move(record)),
+      csv_(record_ != nullptr ? std::make_unique<CsvWriter>(record_->stream()) : nullptr),
       ring_(std::make_unique<Ring>()) {
   if (record_ != nullptr) {
     write_header();
@@ -27,8 +29,8 @@ TelemetryReport TelemetryPublisher::stop() {
     thread_.join();
     report_.drops = ring_->drops();
     report_.send_failures = link_ != nullptr ? link_->counters().send_failures : 0;
-    if (record_ != nullptr && !record_->close() && report_.record_drops == 0) {
-      report_.record_drops = 1;  // the last rows were lost in the file's own buffer
+    if (rows_ > 0 && !record_->publish() && report_.record_drops == 0) {
+      report_.record_drops = 1;  // the last rows were lost in the file's own buffer, or all with their place
     }
   }
   return report_;
@@ -59,37 +61,38 @@ void TelemetryPublisher::drain() {
 }
 
 void TelemetryPublisher::write_header() {
-  record_->head("seq");
-  record_->head("time_s");
+  csv_->head("seq");
+  csv_->head("time_s");
   for (const char* name :
        {"measured_angle_rad", "measured_speed_rad_s", "reference_angle_rad", "reference_speed_rad_s",
         "reference_acceleration_rad_s2", "torque_commanded_nm", "torque_applied_nm", "estimated_angle_rad",
         "estimated_speed_rad_s", "estimated_disturbance", "filtered_disturbance", "integral_error_rad_s"}) {
-    record_->head(name, joints_);
+    csv_->head(name, joints_);
   }
   for (const char* name : {"membership_sum", "premise_excess", "lyapunov_rad2", "flags", "state", "step_ns"}) {
-    record_->head(name);
+    csv_->head(name);
   }
-  record_->end_row();
+  csv_->end_row();
 }
 
 void TelemetryPublisher::write_row(const telemetry_v1& sample) {
-  record_->add(sample.seq);
-  record_->add(static_cast<double>(sample.seq) * sample_period_s_);
+  csv_->add(sample.seq);
+  csv_->add(static_cast<double>(sample.seq) * sample_period_s_);
   for (const double* values :
        {sample.measured_angle_rad, sample.measured_speed_rad_s, sample.reference_angle_rad,
         sample.reference_speed_rad_s, sample.reference_acceleration_rad_s2, sample.commanded_torque_nm,
         sample.applied_torque_nm, sample.estimated_angle_rad, sample.estimated_speed_rad_s,
         sample.estimated_disturbance, sample.filtered_disturbance, sample.integral_error_rad_s}) {
-    record_->add(values, joints_);
+    csv_->add(values, joints_);
   }
   for (const double value : {sample.membership_sum, sample.premise_excess, sample.lyapunov_rad2}) {
-    record_->add(value);
+    csv_->add(value);
   }
-  record_->add(static_cast<std::int64_t>(sample.flags));
-  record_->add(static_cast<std::int64_t>(sample.state));
-  record_->add(sample.step_ns);
-  if (!record_->end_row()) {
+  csv_->add(static_cast<std::int64_t>(sample.flags));
+  csv_->add(static_cast<std::int64_t>(sample.state));
+  csv_->add(sample.step_ns);
+  ++rows_;
+  if (!csv_->end_row()) {
     ++report_.record_drops;
   }
 }

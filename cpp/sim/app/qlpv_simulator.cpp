@@ -1,4 +1,5 @@
 // qlpv-simulator: the plant of one scenario, one run over LCM. Contract: docs/reference/messages.md
+#include <atomic>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -49,34 +50,19 @@ Json describe(const PlantRunReport& run, const Link& link, bool realtime) {
           {"link", to_json(link.counters())}};
 }
 
-/// The record of a run, created before it starts so that a bad path costs nothing.
-class RecordFile {
- public:
-  /// Throws InputError if the file cannot be created.
-  explicit RecordFile(const std::string& path)
-      : path_(path), file_(path.empty() ? nullptr : std::make_unique<CsvWriter>(path)) {}
-
-  /// Where the run records, null without a path.
-  Record* record() { return file_ == nullptr ? nullptr : &record_; }
-
-  /// Says so if not all of it could be written; returns whether all of it was.
-  bool write() {
-    if (file_ == nullptr) {
-      return true;
-    }
-    record_.write_csv(*file_);
-    const bool whole = file_->close();
-    if (!whole) {
-      std::cerr << "qlpv-simulator: " << path_ << ": record: got a write error, expected room for the whole record\n";
-    }
-    return whole;
+/// Says so if not all of a record could be written; returns whether all of it was. A run without a sample has none.
+bool write(const Record& record, OutputFile* file, const std::string& path) {
+  if (file == nullptr || record.columns().empty() || record.columns().front().samples() == 0) {
+    return true;
   }
-
- private:
-  std::string path_;
-  std::unique_ptr<CsvWriter> file_;
-  Record record_;
-};
+  CsvWriter csv(file->stream());
+  record.write_csv(csv);
+  const bool whole = file->publish();
+  if (!whole) {
+    std::cerr << "qlpv-simulator: " << path << ": record: got a write error, expected room for the whole record\n";
+  }
+  return whole;
+}
 
 /// Why the run counts as stopped by a fault; empty if it does not.
 std::string fault_stop_reason(const PlantRunReport& run, const Link& link) {
@@ -119,6 +105,8 @@ int run(const CLI::App& app, Options& options) {
     throw InputError(options.scenario, "plant", std::to_string(scenario.joints()) + " joints",
                      std::to_string(artifact.joints()) + " as in artifact '" + artifact.name() + "'");
   }
+  const std::atomic<bool>& stop = install_stop_signals();
+  const std::unique_ptr<OutputFile> file = open_record(common, "qlpv-simulator", options.scenario);
   PlantSession session(scenario, artifact.sample_period_s());
   const bool realtime = apply_priority(app, common);
   const WireIdentity identity = identity_of(common, artifact);
@@ -129,15 +117,15 @@ int run(const CLI::App& app, Options& options) {
   options.run.timeout_s = common.timeout_s;
   options.run.torque_limit_nm = artifact.limits().torque_nm;
   options.run.brake_nm_s = viscous_brake(scenario, options.brake_time_constant_s);
-  RecordFile file(common.record);
+  Record record;
   PlantRunReport report;
   try {
-    report = run_plant(session, link, options.run, file.record(), install_stop_signals());
+    report = run_plant(session, link, options.run, file != nullptr ? &record : nullptr, stop);
   } catch (const PlantError&) {
-    file.write();  // what led to the failure
+    write(record, file.get(), common.record);  // what led to the failure
     throw;
   }
-  const bool recorded = file.write();
+  const bool recorded = write(record, file.get(), common.record);
   print_report(std::cout, describe(report, link, realtime), common.json);
   const int code = exit_code(report, link, common);
   return code == kExitDone && !recorded ? kExitBadInput : code;

@@ -7,14 +7,17 @@
 #include <initializer_list>
 #include <iostream>
 #include <limits>
+#include <memory>
 #include <new>
 #include <string>
+#include <vector>
 
 #include "quasilpv/artifact.hpp"
 #include "quasilpv/errors.hpp"
 #include "quasilpv/exit_codes.hpp"
 #include "quasilpv/lcm_link.hpp"
 #include "quasilpv/options.hpp"
+#include "quasilpv/output_file.hpp"
 #include "quasilpv/pacer.hpp"
 #include "quasilpv/process_setup.hpp"
 #include "quasilpv/realtime.hpp"
@@ -100,6 +103,17 @@ inline void apply_key(const CommonOptions& options, Link& link) {
   if (!options.key.empty()) {
     link.authenticate_with(MessageKey::load(options.key));
   }
+}
+
+/// The file of `--record`, null without; `document` is what the program reads besides the artifact and the key.
+/// INIT-ONLY. Throws InputError like OutputFile.
+inline std::unique_ptr<OutputFile> open_record(const CommonOptions& options, const std::string& program,
+                                               const std::string& document) {
+  if (options.record.empty()) {
+    return nullptr;
+  }
+  return std::make_unique<OutputFile>(options.record, "record", program,
+                                      std::vector{options.artifact, document, options.key});
 }
 
 /// What a run on the same address looks like from here; empty if there is no sign of one.

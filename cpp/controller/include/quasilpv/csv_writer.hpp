@@ -1,8 +1,7 @@
-// Rows of exact numbers into a file or stream, one after the other.
+// Rows of exact numbers into a stream, one after the other.
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <ostream>
 #include <string>
 
@@ -12,8 +11,6 @@ namespace quasilpv {
 /// equal files. A full disk is an outcome, not an exception. RT-UNSAFE.
 class CsvWriter {
  public:
-  /// Throws InputError if the file cannot be created.
-  explicit CsvWriter(const std::string& path);
   /// Writes to a stream that outlives this.
   explicit CsvWriter(std::ostream& out) : out_(out) {}
   CsvWriter(const CsvWriter&) = delete;
@@ -29,13 +26,9 @@ class CsvWriter {
   /// Ends the header or a row. Returns false if it, or an earlier one, could not be written.
   bool end_row();
 
-  /// Flushes, and closes the file; false if anything was lost.
-  bool close();
-
  private:
   void separate();
 
-  std::ofstream file_;
   std::ostream& out_;
   std::string row_;
 };

@@ -40,7 +40,8 @@ void leave_realtime() noexcept;
 /// this process. INIT-ONLY.
 bool pin_to_cpu(int cpu) noexcept;
 
-/// Set by SIGINT and SIGTERM once the handlers are installed, which interrupt a sleep or a wait. INIT-ONLY.
+/// Set by SIGINT, SIGTERM and SIGHUP (unless that is ignored) once the handlers are installed, which interrupt a sleep
+/// or a wait. INIT-ONLY.
 const std::atomic<bool>& install_stop_signals() noexcept;
 
 }  // namespace quasilpv

@@ -8,6 +8,7 @@
 
 #include "quasilpv/csv_writer.hpp"
 #include "quasilpv/link.hpp"
+#include "quasilpv/output_file.hpp"
 #include "quasilpv/telemetry_ring.hpp"
 
 namespace quasilpv {
@@ -29,18 +30,19 @@ class TelemetryPublisher {
  public:
   using Ring = SampleRing;
 
-  /// Starts the thread, which runs at normal priority. INIT-ONLY. Throws InputError if the record cannot be created.
+  /// Starts the thread, which runs at normal priority. INIT-ONLY.
   ///
-  /// @param link         where to publish; may be null
-  /// @param record_path  CSV file; empty: none
-  TelemetryPublisher(std::unique_ptr<Link> link, double sample_period_s, int joints, const std::string& record_path);
+  /// @param link    where to publish; may be null
+  /// @param record  CSV file; may be null. It takes its place if it has a row at the end.
+  TelemetryPublisher(std::unique_ptr<Link> link, double sample_period_s, int joints,
+                     std::unique_ptr<OutputFile> record);
   ~TelemetryPublisher();
   TelemetryPublisher(const TelemetryPublisher&) = delete;
   TelemetryPublisher& operator=(const TelemetryPublisher&) = delete;
 
   Ring& ring() noexcept { return *ring_; }
 
-  /// Publishes and records what is left, closes the record and ends the thread. Call after the last push.
+  /// Publishes and records what is left, lets the record take its place and ends the thread. Call after the last push.
   TelemetryReport stop();
 
  private:
@@ -52,7 +54,9 @@ class TelemetryPublisher {
   std::unique_ptr<Link> link_;
   double sample_period_s_;
   int joints_;
-  std::unique_ptr<CsvWriter> record_;
+  std::unique_ptr<OutputFile> record_;
+  std::unique_ptr<CsvWriter> csv_;
+  std::int64_t rows_ = 0;
   std::unique_ptr<Ring> ring_;
   TelemetryReport report_;
   std::atomic<bool> stopping_{false};
