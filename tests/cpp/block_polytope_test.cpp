@@ -217,8 +217,15 @@ TEST(BlockPolytope, without_premises_is_its_one_vertex) {
 TEST(BlockPolytope, refuses_a_collapse_that_does_not_reproduce_the_vertices) {
   std::mt19937_64 random(43);
   Json table = AffineMatrix(1, random).table({{0}});
-  table["lower"][0] = -1.5e308;  // the width of the box overflows: every slope becomes zero
-  table["upper"][0] = 1.5e308;
+  table["lower"][0] = -1e100;  // over the widest box the slopes of the smallest vertices are zero in double arithmetic
+  table["upper"][0] = 1e100;
+  for (Json& vertex : table["blocks"][0]["vertices"]) {
+    for (Json& row : vertex) {
+      for (Json& entry : row) {
+        entry = entry.get<double>() * 1e-250;
+      }
+    }
+  }
   EXPECT_THAT(refusal([&] { parse(table); }), HasSubstr("inertia: got a collapsed form that is off by"));
 }
 
