@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,11 +23,16 @@ from quasilpv.lmi import budget, worker
 from quasilpv.lmi.budget import Limits, TimeUpError, TooLargeError
 from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.polytopes import polytopic_model
+from quasilpv.studies import affordable
+from quasilpv.studies.front_door import question
 from quasilpv.systems.catalogue import system
 from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.equations import rate
 
 ROOT = Path(__file__).parents[2]
+
+LARGE = {"II.7", "II.8", "II.8-direct"}
+"""Conditions that take seconds to write down for anything."""
 
 
 def quadrotor() -> DescriptorSystem:
@@ -110,6 +116,38 @@ def test_what_is_too_large_names_its_size_and_cheaper_ways_that_are_within_the_l
     assert "--common" in str(refused.value)
 
 
+def test_looking_for_cheaper_ways_ends_in_time_and_says_what_it_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = question(quadrotor(), "II.6")
+    monkeypatch.setattr(affordable, "WAYS_S", 1e-6)
+    start = time.monotonic()
+    assert "no cheaper way of asking is known" in affordable.ways(asked)
+    assert time.monotonic() - start < 2.0
+
+
+def test_no_way_is_named_that_is_not_cheaper() -> None:
+    assert "no cheaper way of asking is known" in affordable.ways(question("ex-I.1", "guerra-2007"))
+    named = affordable.ways(question("ex-I.1", "II.8"))
+    assert "--representation reduced" in named
+    assert "--common" not in named
+
+
+@pytest.mark.parametrize("name", [n if n not in LARGE else pytest.param(n, marks=pytest.mark.full) for n in CONDITIONS])
+def test_conditions_say_whether_common_multipliers_make_a_difference(name: str) -> None:
+    for known in ("ex-I.1", "ex-III.10", "ex-II.5"):
+        asked = question(known, name)
+        try:
+            free, common = (
+                replace(asked, options=replace(asked.options, common=common)).inequalities().problem
+                for common in (False, True)
+            )
+        except InputError:
+            continue
+        sizes = [(len(one.constraints), sum(v.size for v in one.variables)) for one in (free, common)]
+        assert (sizes[0] != sizes[1]) == condition(name).has_multipliers
+        return
+    pytest.skip("applies to none of these")
+
+
 @pytest.mark.parametrize("limits", [{"time_limit_s": 0.0}, {"memory_limit_gib": -1.0}, {"time_limit_s": float("nan")}])
 def test_limits_without_a_meaning_are_refused(limits: dict[str, float]) -> None:
     with pytest.raises(InputError, match="limit"):
@@ -131,16 +169,46 @@ def answer_or_refusal(name: str) -> str:
         return str(error)
 
 
+PHASES = {
+    "building": "quasilpv.lmi.problem.Problem.positive",
+    "compiling": "quasilpv.lmi.compiled.CompiledProblem.of",
+    "solving": "quasilpv.lmi.worker._apart",
+    "looking for cheaper ways": "quasilpv.studies.affordable._size",
+}
+"""What a question enters, by what it is doing then."""
+
+WATCHED = """
+import sys, unittest.mock
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from test_budget import quadrotor
+import pkgutil
+
+def entered(*arguments, **options):
+    Path({entered!r}).touch()
+    return original(*arguments, **options)
+
+original = pkgutil.resolve_name({target!r})
+unittest.mock.patch({target!r}, entered).start()
+"""
+
+
 @pytest.mark.full
-def test_kill_int_ends_a_question_about_the_quadrotor(tmp_path: Path) -> None:
-    own = tmp_path / "own.py"
-    path = str(ROOT / "tests" / "python")
-    own.write_text(f"import sys\nsys.path.insert(0, {path!r})\nfrom test_budget import quadrotor\n", encoding="utf-8")
-    asked = [sys.executable, "-m", "quasilpv", "solve", f"{own}:quadrotor", "-c", "II.6", "--memory-limit", "16"]
-    process = subprocess.Popen(asked, stderr=subprocess.PIPE)
-    time.sleep(15.0)
+@pytest.mark.parametrize("phase", PHASES)
+def test_kill_int_ends_a_question_about_the_quadrotor_whatever_it_is_doing(phase: str, tmp_path: Path) -> None:
+    own, entered = tmp_path / "own.py", tmp_path / "entered"
+    tests = str(ROOT / "tests" / "python")
+    own.write_text(WATCHED.format(tests=tests, entered=str(entered), target=PHASES[phase]), encoding="utf-8")
+    limits = ["--memory-limit", "4" if phase == "looking for cheaper ways" else "16"]
+    asked = [sys.executable, "-m", "quasilpv", "solve", f"{own}:quadrotor", "-c", "II.6", *limits]
+    process = subprocess.Popen(asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not entered.exists():
+        assert process.poll() is None
+        time.sleep(0.05)
+    time.sleep(0.3)
     start = time.monotonic()
     process.send_signal(signal.SIGINT)
-    process.wait(10.0)
+    _, errors = process.communicate(timeout=30.0)
     assert time.monotonic() - start < 2.0
-    assert process.returncode != 0
+    assert process.returncode == 130
+    assert "Traceback" not in errors

@@ -123,6 +123,7 @@ class Condition:
         representation: with which it was published.
         inequalities: writes them for a model that has what the condition relies on; ask `build`.
         relies_on: what a solution of them is worth nothing without, see `quasilpv.conditions.reliance`.
+        has_multipliers: whether `Options.common` makes a difference.
     """
 
     id: str
@@ -131,6 +132,7 @@ class Condition:
     representation: str
     inequalities: Callable[[PolytopicModel, Options], Statement]
     relies_on: tuple[Reliance, ...]
+    has_multipliers: bool = False
 
     def build(self, model: PolytopicModel, options: Options) -> Statement:
         """State it for a model.

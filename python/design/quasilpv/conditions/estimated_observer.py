@@ -192,4 +192,5 @@ CONDITION = Condition(
         Reliance.EULER,
         Reliance.DOMAIN,
     ),
+    has_multipliers=True,
 )

@@ -152,6 +152,7 @@ CONDITION = Condition(
     representation="per-premise@0",
     inequalities=inequalities,
     relies_on=COMPENSATION,
+    has_multipliers=True,
 )
 
 COROLLARY = Condition(
@@ -161,4 +162,5 @@ COROLLARY = Condition(
     representation="per-premise@0",
     inequalities=without_slack,
     relies_on=COMPENSATION,
+    has_multipliers=True,
 )

@@ -60,4 +60,5 @@ CONDITION = Condition(
     representation="per-premise@0",
     inequalities=inequalities,
     relies_on=DESCRIPTOR_LAW,
+    has_multipliers=True,
 )

@@ -55,4 +55,5 @@ CONDITION = Condition(
     representation="uncertain@0",
     inequalities=inequalities,
     relies_on=COMPENSATION,
+    has_multipliers=True,
 )

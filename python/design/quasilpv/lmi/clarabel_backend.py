@@ -11,11 +11,10 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import clarabel
 import numpy as np
 from scipy import sparse
 
-from quasilpv.lmi import budget
+from quasilpv.lmi import budget, worker
 from quasilpv.lmi.assembly import gradient, unpack, upper_triangle
 from quasilpv.lmi.expressions import Expression, Variable
 from quasilpv.lmi.raw_solution import RawSolution
@@ -34,38 +33,19 @@ def solve(
         objective: 1 x 1 expression, or None for feasibility.
         variables: all variables, in the order of the unknown vector.
     """
-    rows, right_hand_side, cones = [], [], []
+    rows, constants = [], []
     for constraint in constraints:
+        budget.time_left_s()
         coefficients, value = upper_triangle(constraint.expression, variables, math.sqrt(0.5))
-        rows.append(-coefficients)
-        right_hand_side.append(value)
-        cones.append(clarabel.PSDTriangleConeT(constraint.expression.shape[0]))
-    linear = gradient(objective, variables)
-    solver = clarabel.DefaultSolver(
-        sparse.csc_matrix((linear.size, linear.size)),
-        linear,
+        rows.append(coefficients)
+        constants.append(value)
+    found = worker.solve(
         sparse.vstack(rows, format="csc"),
-        np.concatenate(right_hand_side),
-        cones,
-        _settings(),
+        np.concatenate(constants),
+        [constraint.expression.shape[0] for constraint in constraints],
+        objective=gradient(objective, variables),
+        method="auto",
     )
-    return _read(solver.solve(), variables)
-
-
-def _settings() -> clarabel.DefaultSettings:
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.max_threads = 1
-    left = budget.time_left_s()
-    if left is not None:
-        settings.time_limit = left
-    return settings
-
-
-def _read(result: clarabel.DefaultSolution, variables: Sequence[Variable]) -> RawSolution:
-    status = str(result.status)
-    infeasible = "PrimalInfeasible" in status
-    point = np.asarray(result.x)
-    if infeasible or not np.all(np.isfinite(point)):
-        return RawSolution(infeasible=infeasible, iterations=result.iterations, status=status)
-    return RawSolution(unpack(point, variables), iterations=result.iterations, status=status)
+    if found.infeasible or not np.all(np.isfinite(found.x)):
+        return RawSolution(infeasible=found.infeasible, iterations=found.iterations, status=found.status)
+    return RawSolution(unpack(found.x, variables), iterations=found.iterations, status=found.status)

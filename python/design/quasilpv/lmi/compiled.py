@@ -146,12 +146,13 @@ class CompiledProblem:
         Off-diagonal entries carry a factor sqrt(2), so that inner products of matrices are those of vectors.
         """
         layout = self.layout
-        values = layout.scale * self._doubles()
+        values = layout.scale * self.doubles()
         offset = layout.sums(np.where(layout.unknown < 0, values, 0.0))
         order, rows, starts = layout.columns
         return sparse.csc_matrix((values[order], rows, starts), shape=(layout.rows, len(layout.kept))), offset
 
-    def _doubles(self) -> FloatArray:
+    def doubles(self) -> FloatArray:
+        """The coefficients, rounded, (nnz,)."""
         if self.coefficients.dtype == np.int64:
             return np.asarray(self.coefficients / float(self.denominator))
         return np.array([c / self.denominator for c in self.coefficients.tolist()])

@@ -267,7 +267,8 @@ def _scaled(matrix: Matrix, factor: Any) -> Matrix:
         product: Matrix = matrix * factor
         return product
     scaled, places = matrix.copy(), np.nonzero(matrix)
-    scaled[places] = matrix[places] * factor
+    entries = matrix[places]
+    scaled[places] = -entries if factor == -1 else entries * factor  # a fraction is negated in a tenth of the time
     return scaled
 
 

@@ -88,7 +88,7 @@ def decide(problem: CompiledProblem) -> Decision:
             )
         if status == "Solved":
             return Decision(Outcome.SOLVER_ONLY, solver_status=status, iterations=solution.iterations)
-    if "PrimalInfeasible" in status:
+    if solution.infeasible:
         excluded = _excluded_norm(problem, coefficients, solution.z)
         return Decision(
             Outcome.INFEASIBLE_NUMERICALLY,

@@ -55,51 +55,78 @@ class Reply:
     z: FloatArray
     iterations: int = 0
 
+    @property
+    def infeasible(self) -> bool:
+        """Whether it claims that there is no point."""
+        return "PrimalInfeasible" in self.status
 
-def solve(coefficients: sparse.csc_matrix, offset: FloatArray, sizes: Sequence[int]) -> Reply:
+
+@dataclass(frozen=True, eq=False)
+class _Program:
+    """What is solved; see `solve`."""
+
+    coefficients: sparse.csc_matrix
+    offset: FloatArray
+    sizes: Sequence[int]
+    objective: FloatArray
+    method: str
+
+
+def solve(
+    coefficients: sparse.csc_matrix,
+    offset: FloatArray,
+    sizes: Sequence[int],
+    *,
+    objective: FloatArray | None = None,
+    method: str = "faer",
+) -> Reply:
     """Find x with ``svec^-1(coefficients x + offset)`` positive semidefinite, block by block.
 
     Args:
         coefficients: scaled upper triangles by unknowns, (rows, unknowns).
         offset: (rows,).
         sizes: order of every block.
+        objective: what is minimised, (unknowns,); None for any x.
+        method: with which linear equations are solved, in Clarabel's words.
 
     Raises:
         TimeUpError: the time limit was reached.
         TooLargeError: the memory limit was.
     """
     left = budget.time_left_s()
+    linear = np.zeros(coefficients.shape[1]) if objective is None else objective
+    program = _Program(coefficients, offset, sizes, linear, method)
     if not budget.is_limited() or coefficients.shape[0] * coefficients.shape[1] <= IN_PLACE:
-        return _in_place(coefficients, offset, sizes, left)
-    return _apart(coefficients, offset, sizes, left)
+        return _in_place(program, left)
+    return _apart(program, left)
 
 
-def _in_place(coefficients: sparse.csc_matrix, offset: FloatArray, sizes: Sequence[int], time_s: float | None) -> Reply:
-    unknowns = coefficients.shape[1]
-    cones = [clarabel.PSDTriangleConeT(size) for size in sizes]
+def _in_place(program: _Program, time_s: float | None) -> Reply:
+    unknowns = program.coefficients.shape[1]
+    cones = [clarabel.PSDTriangleConeT(size) for size in program.sizes]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1
-    settings.direct_solve_method = "faer"
+    settings.direct_solve_method = program.method
     if time_s is not None:
         settings.time_limit = time_s
     quadratic = sparse.csc_matrix((unknowns, unknowns))
-    found = clarabel.DefaultSolver(quadratic, np.zeros(unknowns), -coefficients, offset, cones, settings).solve()
+    data = quadratic, program.objective, -program.coefficients, program.offset
+    found = clarabel.DefaultSolver(*data, cones, settings).solve()
     if str(found.status) == "MaxTime":
         budget.time_is_up()
     return Reply(str(found.status), np.asarray(found.x), np.asarray(found.z), found.iterations)
 
 
-def _apart(coefficients: sparse.csc_matrix, offset: FloatArray, sizes: Sequence[int], time_s: float | None) -> Reply:
+def _apart(program: _Program, time_s: float | None) -> Reply:
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     memory = budget.memory_limit_gib()
-    program = (coefficients, offset, sizes)
     child = context.Process(target=_work, args=(sender, os.getpid(), memory, program))
     child.start()
     sender.close()
     start = time.monotonic()
-    progress = _Progress(coefficients.shape, time_s)
+    progress = _Progress(program.coefficients.shape, time_s)
     try:
         while not receiver.poll(POLL_S):
             passed = time.monotonic() - start
@@ -122,7 +149,7 @@ def _work(
     sender: Connection,
     parent: int,
     memory_gib: float | None,
-    program: tuple[sparse.csc_matrix, FloatArray, Sequence[int]],
+    program: _Program,
 ) -> None:
     """In the process of its own: Ctrl-C is for the parent, and it does not outlive it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -137,7 +164,7 @@ def _work(
     if memory_gib is not None:
         most = _address_space() + int(memory_gib * budget.GIB)
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
-    sender.send(_in_place(*program, None))
+    sender.send(_in_place(program, None))
     sender.close()
     os._exit(0)
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -213,7 +213,7 @@ def _regulated_sizes(centre: SystemMatrices, q: int) -> FloatArray | None:
         drift, inputs = reduced[:, :q], reduced[:, q:]
         gain = np.zeros((m, q))
         if m:
-            gain = -inputs.T @ scipy.linalg.solve_continuous_are(drift, inputs, np.eye(q), np.eye(m))
+            gain = -inputs.T @ _riccati(drift, inputs)
         closed = drift + inputs @ gain
         if np.linalg.eigvals(closed).real.max() >= 0.0:
             return None
@@ -226,3 +226,20 @@ def _regulated_sizes(centre: SystemMatrices, q: int) -> FloatArray | None:
         return None
     floor = 1e-12 * squares.max()
     return np.asarray(np.sqrt(np.maximum(squares, floor)))
+
+
+def _riccati(drift: NDArray[Any], inputs: NDArray[Any]) -> FloatArray:
+    """The stabilising X of ``drift' X + X drift - X inputs inputs' X + I = 0``, (q, q).
+
+    From the stable subspace of the Hamiltonian matrix (Laub 1979): what it is for needs one digit, and scipy, which is
+    asked where that fails, takes ten times as long to be careful.
+
+    Raises:
+        LinAlgError: there is none.
+    """
+    q = len(drift)
+    hamiltonian = np.block([[drift, -inputs @ inputs.T], [-np.eye(q), -drift.T]])
+    _, basis, stable = scipy.linalg.schur(hamiltonian, sort="lhp")
+    if stable != q:
+        return np.asarray(scipy.linalg.solve_continuous_are(drift, inputs, np.eye(q), np.eye(inputs.shape[1])))
+    return np.asarray(np.linalg.solve(basis[:q, :q].T, basis[q:, :q].T).T)

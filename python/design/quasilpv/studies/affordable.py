@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from quasilpv.conditions.choices import Slack
+from quasilpv.conditions.registry import condition
 from quasilpv.defaults import DEFAULT_MEMORY_GIB
 from quasilpv.errors import InputError
 from quasilpv.lmi import budget
@@ -18,13 +20,15 @@ from quasilpv.studies.answer import Answer, Verdict
 if TYPE_CHECKING:
     from quasilpv.studies.question import Question
 
-ALTERNATIVE_S = 6.0
-"""What writing an alternative down may take; one that takes longer is none."""
+WAYS_S = 6.0
+"""What looking for cheaper ways may take in all: no answer comes later than that after its time limit."""
 
-ALTERNATIVES_S = 10.0
-"""What writing down all of them may take, those that take too long included: whoever asks has waited already."""
+ALTERNATIVE_S = 3.0
+"""What writing one of them down may take; one that takes longer is none."""
 
 MOST_ALTERNATIVES = 3
+
+REPRESENTATION = "--representation"
 
 SPARE = 0.5
 """An alternative is named if it needs this share of the memory limit at most."""
@@ -77,36 +81,49 @@ def require_affordable(question: Question, layout: Layout) -> None:
 
 
 def ways(question: Question) -> str:
-    """Cheaper ways to ask a question, smallest first, with their sizes."""
-    found: list[tuple[Size, str]] = []
-    with budget.limited(Limits(ALTERNATIVES_S)):
+    """Cheaper ways to ask a question, smallest last, with their sizes; takes `WAYS_S` at most."""
+    found: dict[Size, str] = {}
+    allowed = SPARE * (question.limits.memory_gib or DEFAULT_MEMORY_GIB)
+    with suppress(TimeUpError), budget.limited(Limits(WAYS_S)):
         for words, other in _others(question):
+            budget.time_left_s()
             size = _size(other)
-            allowed = question.limits.memory_gib or DEFAULT_MEMORY_GIB
-            if size is not None and size.memory_gib <= SPARE * allowed:
-                found.append((size, words))
+            if size is None or size.memory_gib > allowed:
+                continue
+            if size not in found or len(words) < len(found[size]):  # some conditions have no use for an option
+                found[size] = words
+        own = _size(question)
+        found = {size: words for size, words in found.items() if own is None or size.memory_gib < own.memory_gib}
     if not found:
-        return "no cheaper way of asking was found: fewer premises or a smaller system"
-    found.sort(key=lambda pair: pair[0].memory_gib, reverse=True)
-    shown = found[-MOST_ALTERNATIVES:]
-    return "cheaper: " + "; ".join(f"{words} ({size})" for size, words in shown)
+        return "no cheaper way of asking is known: fewer premises or a smaller system"
+    shown = sorted(found, key=lambda size: size.memory_gib, reverse=True)[-MOST_ALTERNATIVES:]
+    return "cheaper: " + "; ".join(f"{found[size]} ({size})" for size in shown)
 
 
 def _others(question: Question) -> Iterator[tuple[str, Question]]:
-    """The question in other words."""
-    options, premises = question.options, question.model().polytope.premises
-    if not options.common:
-        yield "--common", replace(question, options=replace(options, common=True))
-    if options.slack is not Slack.NONE:
-        fewer = Slack.NONE if options.slack is Slack.THESIS else Slack.THESIS
-        yield f"--slack {fewer.value}", replace(question, options=replace(options, slack=fewer))
+    """The question in other words, those of few vertices first."""
+    options, model = question.options, question.model()
+    premises, own = model.polytope.premises, question.representation
     pairs = ",".join("+".join(map(str, range(k, min(k + 2, premises)))) for k in range(0, premises, 2))
-    for other in ("reduced", "per-premise", "ts", f"grouped={pairs}"):
-        if premises and not question.representation.startswith(other):
-            yield f"--representation {other}", replace(question, representation=other)
-            if not options.common:
-                common = replace(options, common=True)
-                yield f"--representation {other} --common", replace(question, representation=other, options=common)
+    vertices = {
+        "reduced": premises + 1,
+        "per-premise": 2 * premises,
+        f"grouped={pairs}": 2 * premises,
+        "ts": 2**premises,
+    }
+    same = own.replace("uncertain", "per-premise")
+    counts = {name: count for name, count in vertices.items() if premises and not same.startswith(name)}
+    counts[own] = model.vertex_count
+    for name in sorted(counts, key=lambda name: counts[name]):
+        words = [] if name == own else [f"{REPRESENTATION} {name}"]
+        other = replace(question, representation=name)
+        if condition(question.condition).has_multipliers and not options.common:
+            yield " ".join([*words, "--common"]), replace(other, options=replace(options, common=True))
+        if words:
+            yield words[0], other
+        elif options.slack is not Slack.NONE and len(model.polytope.blocks) > 1:
+            fewer = Slack.NONE if options.slack is Slack.THESIS else Slack.THESIS
+            yield f"--slack {fewer.value}", replace(other, options=replace(options, slack=fewer))
 
 
 def _size(question: Question) -> Size | None:

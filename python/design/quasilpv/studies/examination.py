@@ -44,6 +44,8 @@ class Case:
         small: whether the margin program is worth its time, see `is_small`.
         exact: makes the system in its representation.
         sketch: the same up to rounding, where that is cheaper: enough to see whether there is anything to do.
+        in_units: the inequalities in other units, where that is cheaper than to write them down; None where it is not
+            known. A solution of these is looked for again, and proved, in those written down.
     """
 
     condition: Condition
@@ -51,6 +53,7 @@ class Case:
     small: bool
     exact: Callable[[], PolytopicModel]
     sketch: PolytopicModel | None = None
+    in_units: Callable[[Units], CompiledProblem | None] = lambda units: None
 
     @cached_property
     def model(self) -> PolytopicModel:
@@ -67,6 +70,15 @@ class Case:
     def statement(self, units: Units | None) -> Statement:
         """The inequalities, in other units."""
         return stated(self.condition, self.model, self.options, units)
+
+    def decided(self, units: Units) -> tuple[Decision, Statement | None]:
+        """The solver's decision in other units, and the statement that a solution belongs to."""
+        sketched = self.in_units(units)
+        decision = None if sketched is None else decide(sketched)
+        if decision is not None and not decision.feasible:
+            return decision, None
+        statement = self.statement(units)
+        return decide(CompiledProblem.of(statement.problem)), statement
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +130,7 @@ def examine(case: Case, first: Decision) -> Finding:
         if units is None:
             outcomes.append(first.outcome)
             continue
-        statement = case.statement(units)
-        decision = decide(CompiledProblem.of(statement.problem))
+        decision, statement = case.decided(units)
         if decision.feasible:
             return solution(decision, 1 + len(tried) - tried.count(None), statement, units)
         outcomes.append(decision.outcome)

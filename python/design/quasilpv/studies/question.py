@@ -6,10 +6,11 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from quasilpv.conditions.condition import Form, Options, Statement
 from quasilpv.conditions.invertibility import proof_of_invertibility
@@ -17,10 +18,11 @@ from quasilpv.conditions.registry import condition
 from quasilpv.conditions.reliance import RefusedError, Reliance, refuse_refuted
 from quasilpv.errors import InputError
 from quasilpv.lmi import largest_margin
-from quasilpv.lmi.budget import Limits, limited
+from quasilpv.lmi.budget import Limits, TimeUpError, TooLargeError, limited
 from quasilpv.lmi.common import common_problem
 from quasilpv.lmi.compiled import CompiledFamily, CompiledProblem, compile_family
 from quasilpv.lmi.feasibility import decide
+from quasilpv.lmi.rescaled import powers_between, rescaled
 from quasilpv.polytopes import BlockPolytope, PolytopicModel, polytopic_model
 from quasilpv.polytopes.scaling import ladder
 from quasilpv.polytopes.units import Units
@@ -34,6 +36,12 @@ from quasilpv.systems.catalogue import system_kind
 from quasilpv.systems.descriptor import DescriptorSystem
 from quasilpv.systems.premise import AffineMatrix
 from quasilpv.systems.system_kind import SystemKind
+
+BETWEEN = 0.40625
+"""How far from the base of a family, in every parameter, no coefficient is expected to vanish."""
+
+LEAST_S = 1e-3
+"""A time limit has to be positive."""
 
 _POLYNOMIAL = frozenset(IMPLIED) - {"I.3"}
 """Conditions whose inequalities, as published, are polynomials in E, A and B: no norms, pivots or ranks of them."""
@@ -75,7 +83,7 @@ class Question:
         kind = system_kind(self.system)
         if isinstance(self.system, str):
             object.__setattr__(self, "system", kind.id)
-        kind.system(**dict(self.parameters))
+        _system(kind, self.parameters)
 
     def at(self, point: Mapping[str, float]) -> Question:
         """The same question with some parameters set."""
@@ -101,7 +109,7 @@ class Question:
 
     def model(self) -> PolytopicModel:
         """The system in its representation. Errors as `statement`."""
-        return polytopic_model(system_kind(self.system).system(**dict(self.parameters)), self.representation)
+        return polytopic_model(_system(system_kind(self.system), self.parameters), self.representation)
 
     def to_document(self) -> dict[str, Any]:
         """JSON-able; a fingerprint tells two contents of one file of a user apart."""
@@ -114,6 +122,12 @@ class Question:
             "parameters": dict(self.parameters),
             "options": asdict(self.options),
         }
+
+
+@lru_cache(maxsize=8)
+def _system(kind: SystemKind, parameters: tuple[tuple[str, float], ...]) -> DescriptorSystem:
+    """The system of a question, which is made when the question is, and looked at when it is answered."""
+    return kind.system(**dict(parameters))
 
 
 class Sweep:
@@ -134,6 +148,7 @@ class Sweep:
         fixed = {name: value for name, value in question.parameters}
         own = system_kind(question.system).family(self.swept, **fixed) if known.id in _POLYNOMIAL else None
         self._own = own
+        self._powers: dict[Units, npt.NDArray[np.intp] | None] = {}
         with limited(question.limits):
             self._family = self._compile()
 
@@ -158,7 +173,11 @@ class Sweep:
         if decision.feasible:
             finding = solution(decision, 1)
         else:
-            case = _case(self.question, compiled, lambda: self._model(point), self._sketch(point))
+            case = replace(
+                _case(self.question, compiled, lambda: self._model(point)),
+                sketch=self._sketch(point),
+                in_units=lambda units: self._in_units(compiled, units),
+            )
             finding = examine(case, decision)
         refused = self._refused([point]) if finding.verdict is Verdict.FEASIBLE else None
         if refused is not None:
@@ -240,6 +259,19 @@ class Sweep:
     def _rescaled(self) -> CompiledFamily | None:
         """The family in those units."""
         return self._compiled(self._units)
+
+    def _in_units(self, own: CompiledProblem, units: Units) -> CompiledProblem | None:
+        """A member of the family in other units, if it is known how."""
+        if self._family is None:
+            return None
+        if units not in self._powers:
+            base, steps = (self._base(), {}) if self._own is None else (self._own.base, self._own.steps)
+            place = {name: value + BETWEEN * steps.get(name, 1.0) for name, value in base.items()}
+            statement = stated(condition(self.question.condition), self._model(place), self.question.options, units)
+            other = CompiledProblem.of(statement.problem)
+            self._powers[units] = powers_between(self._family.at(place), other)
+        powers = self._powers[units]
+        return None if powers is None else rescaled(own, powers)
 
     def _sketch(self, point: Mapping[str, float]) -> PolytopicModel | None:
         """The system at a point, up to rounding, where it need not be built anew; the premises are those of all."""
@@ -352,23 +384,29 @@ def largest_or_reached_margin(question: Question, answer: Answer) -> float | Non
     """How far a question is from the edge between feasible and infeasible; see `quasilpv.lmi.margin`.
 
     In the units of the answer, or those fitted first if it is not feasible: the margin depends on them. Of a problem
-    too large for the margin program, or with another factoring, what the answer reached; None if it is not feasible.
+    too large for the margin program, with another factoring, or larger than the time left allows, what the answer
+    reached; None if it is not feasible.
     """
     if not answer.unknowns or answer.factoring or not is_small(answer.rows, answer.unknowns):
         return answer.margin
-    feasible = answer.verdict is Verdict.FEASIBLE
-    units = answer.units if feasible else next(ladder(question.model().system))
-    return _finite(largest_margin(question.statement(units).problem).margin)
+    feasible, allowed = answer.verdict is Verdict.FEASIBLE, question.limits.time_s
+    left = None if allowed is None else max(allowed - answer.seconds, LEAST_S)
+    try:
+        with limited(replace(question.limits, time_s=left)):
+            units = answer.units if feasible else next(ladder(question.model().system))
+            margin = largest_margin(question.statement(units).problem)
+    except (TimeUpError, TooLargeError):
+        return answer.margin
+    return _finite(margin.margin)
 
 
 def _case(
     question: Question,
     compiled: CompiledProblem,
     exact: Callable[[], PolytopicModel],
-    sketch: PolytopicModel | None = None,
 ) -> Case:
     small = is_small(sum(compiled.layout.sizes), compiled.layout.unknowns)
-    return Case(condition(question.condition), question.options, small, exact, sketch)
+    return Case(condition(question.condition), question.options, small, exact)
 
 
 def _answer(compiled: CompiledProblem, finding: Finding, start: float) -> Answer:

@@ -22,6 +22,7 @@ import numpy.typing as npt
 import sympy as sp
 
 from quasilpv.conditions.condition import Options
+from quasilpv.lmi import budget
 from quasilpv.lmi.exact import Matrix, to_rational
 from quasilpv.polytopes import PolytopicModel
 from quasilpv.studies.frozen_modes import Disk, HalfPlane, Mode, Stable, eliminated, unreachable_mode
@@ -105,6 +106,9 @@ def refutation(condition: str, model: PolytopicModel, options: Options) -> Refut
         condition: its id.
         model: the system in its representation.
         options: of the condition.
+
+    Raises:
+        TimeUpError: the time limit was reached (`quasilpv.lmi.budget`).
     """
     if condition not in IMPLIED or model.order > ORDER_LIMIT:
         return None
@@ -113,6 +117,7 @@ def refutation(condition: str, model: PolytopicModel, options: Options) -> Refut
     system, points = own.system, list(_points(own))
     constants = [_Affine.of(matrix) for matrix in (system.E, system.A, system.B, system.C)]
     for number in np.flatnonzero(_suspects(loop, own, points, stable)):
+        budget.time_left_s()
         z = points[number]
         mode = _mode(loop, [matrix.at(z) for matrix in constants], system.differential, stable)
         if mode is not None:
