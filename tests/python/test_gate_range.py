@@ -39,6 +39,7 @@ SCALE = 1.2
 ANSWER = {
     "passed": bool,
     "proved": bool,
+    "evidence": str,
     "inertia_margin": list,
     "delay_margin_s": float,
     "proved_in_motion": type(None),

@@ -35,6 +35,7 @@ RATE_HZ = 4000.0
 ANSWER = {
     "passed": bool,
     "proved": bool,
+    "evidence": str,
     "inertia_margin": list,
     "delay_margin_s": float,
     "needed_range": list,

@@ -107,17 +107,18 @@ def test_when_a_plant_written_in_python_follows_the_documented_format_expect_it_
 def test_the_doctor_measures_and_advises_in_words_and_for_machines(experiment: Experiment) -> None:
     doctor = [executable("qlpv-controller"), "--doctor", "--seconds", "0.1", "--url", experiment.url]
     code, report, _ = experiment.run([*doctor, "--artifact", str(experiment.folder / "artifact.json"), "--json"])
-    assert code == 0
+    assert code in (0, 1)  # 1: on a busy machine it says no
     assert report["period_ns"] == 1_000_000
     for latency in ("wakeup_ns", "step_ns", "round_trip_ns"):
         assert report[latency]["count"] > 0
         assert 0 < report[latency]["p50"] <= report[latency]["max"]
-    words = subprocess.run(doctor, capture_output=True, text=True, check=True, timeout=LIMIT_S).stdout
+    words = subprocess.run(doctor, capture_output=True, text=True, check=False, timeout=LIMIT_S).stdout
     assert "At 1000 Hz this machine " in words
 
 
 def test_the_doctor_says_what_an_unprivileged_user_lacks(experiment: Experiment) -> None:
     doctor = [executable("qlpv-controller"), "--doctor", "--seconds", "0.05", "--url", experiment.url, "--json"]
     code, report, _ = experiment.run(without_privileges(doctor))
-    assert (code, report["fifo"], report["wakeup_fifo_ns"]) == (0, False, None)
+    assert code in (0, 1)  # 1 on a machine that would not hold the rate
+    assert (report["fifo"], report["wakeup_fifo_ns"]) == (False, None)
     assert any("CAP_SYS_NICE" in sentence for sentence in report["advice"])

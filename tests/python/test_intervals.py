@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from quasilpv.errors import InputError
-from quasilpv.systems.intervals import _IntervalFunction, _lower, _upper, enclose
+from quasilpv.systems.intervals import IntervalFunction, _lower, _upper, enclose
 from quasilpv.systems.quotients import expm1_quotient, tanh_quotient
 
 x, y, w = sp.symbols("x y w", real=True)
@@ -129,7 +129,7 @@ def test_monotone_functions_are_enclosed_exactly(
 def test_slopes_of_functions_contain_their_difference_quotients(
     function: type[sp.Function], interval: tuple[float, float]
 ) -> None:
-    _, (slope,) = _IntervalFunction(function(x), [x]).value_and_gradient((interval,))
+    _, (slope,) = IntervalFunction(function(x), [x]).value_and_gradient((interval,))
     values = sp.lambdify([x], function(x), "numpy")
     points = np.linspace(*interval, 401)
     rises = np.diff(np.broadcast_to(values(points), points.shape))

@@ -416,7 +416,7 @@ class TestCommands:
         for number, change in enumerate(changes, start=2):
             more = mapped(*change)
             assert made.items() <= more.items()
-            assert len(more) == 3 * number  # JSON, PNG, SVG
+            assert len(more) == 2 * number  # JSON and PNG
             made = more
         assert mapped("a=-2:6:3").keys() == made.keys()
         assert len(list(tmp_path.glob("*.jsonl"))) == 1

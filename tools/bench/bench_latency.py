@@ -59,7 +59,7 @@ def doctor(prefix: tuple[str, ...], artifact: Path, seconds: str) -> Any:
     command = [program or find_executable("qlpv-controller"), "--doctor", "--json", "--url", URL]
     command += ["--artifact", str(artifact), "--seconds", seconds]
     done = subprocess.run([*prefix, *command], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
+    if done.returncode not in (0, 1):  # 1: it measured, and says that this machine will not hold the rate
         raise ProgramError(f"qlpv-controller --doctor: {' '.join(done.stderr.split())}")
     return json.loads(done.stdout)
 

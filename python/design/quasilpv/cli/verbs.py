@@ -64,7 +64,7 @@ VERBS: Mapping[str, Verb] = {
     "list": Verb("listing", "What there is: robots, controllers, scenarios, conditions."),
     "synth": Verb("synth", "Design a controller and write its artifact."),
     "inspect": Verb("inspect", "What is in an artifact."),
-    "verify": Verb("verify", "Every inequality of an artifact again, and what its verdict rests on."),
+    "verify": Verb("verify", "Every inequality again, and what its verdict rests on."),
     "robust": Verb("robust", "The robust gate: every posture, payload, small delay."),
     "export-sdp": Verb("export_sdp", "The semidefinite program behind a law, as a file."),
     "track": Verb("track", "Scenarios in closed loop: table and figures."),

@@ -32,6 +32,7 @@ _DESIGN_ROOMS = (
     "certificate",
     "artifact",
     "files",
+    "defaults.py",
     "release.py",
 )
 
