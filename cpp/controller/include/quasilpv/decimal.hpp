@@ -19,7 +19,7 @@ std::int64_t parse_integer(const std::string& text, const std::string& source, c
 /// A text in quotation marks on one line, whatever it holds; long ones are cut. INIT-ONLY.
 std::string quoted(const std::string& text);
 
-/// A message on one line: control characters are written as \n, \t or \xNN. INIT-ONLY.
+/// A message on one line: control characters are written as their escapes in C. INIT-ONLY.
 std::string on_one_line(const std::string& message);
 
 /// A number with nine digits, as messages show it: 0.001, 86400, 1e+12. RT-UNSAFE.
