@@ -1,0 +1,290 @@
+"""Storages for the chain certificate: found by semidefinite programming on sampled coordinates, worth what the exact
+check says of them.
+
+The inequalities of `quasilpv.certificate.chain` are affine in the storages and in the bound c. So
+
+1. the best bound on a few coordinates per joint is a semidefinite program;
+2. with the bound relaxed by a little, the storages are chosen with the largest common margin;
+3. where a denser sample finds an inequality violated, its coordinate is added, and 2 (or 1) is repeated.
+
+A fixed sample alone often fails the exact check; a solver that ends "AlmostSolved" often passes it. Only the check
+counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import Literal, TypeAlias
+
+import clarabel
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+
+from quasilpv.systems.tree import KinematicTree
+
+FloatArray = npt.NDArray[np.float64]
+Side: TypeAlias = Literal["lowest", "highest"]
+
+ANGLES_PER_TURN = 16
+FEWEST_ANGLES = 9
+DENSE_ANGLES = 400
+SPARE = 0.003
+"""How far beyond the best bound of the samples the proof is asked for, relative."""
+
+ROUNDS = 8
+STORAGE_BITS = 24
+"""Storages are rounded to multiples of 2^-24 of their own scale."""
+
+
+@dataclass(frozen=True, eq=False)
+class InertiaPairing:
+    """A design inertia and the set of true ones, of one kinematic chain.
+
+    Attributes:
+        tree: the chain; its inertias are not looked at.
+        design: M_n by its bodies' matrices (n, 6, 6) and rotor inertias (n,).
+        true: for every body the matrices its true inertia is a convex combination of, each (count, 6, 6): the vertices
+            that matter for the side in question.
+        true_rotors: (n,).
+    """
+
+    tree: KinematicTree
+    design: FloatArray
+    design_rotors: FloatArray
+    true: Sequence[FloatArray]
+    true_rotors: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Storages:
+    """What was found.
+
+    Attributes:
+        bound: c.
+        matrices: z_1 as 1 x 1, then Z_2 .. Z_(n-1).
+        margin: smallest scaled eigenvalue over the dense sample.
+        rounds: of adding coordinates.
+    """
+
+    bound: float
+    matrices: tuple[FloatArray, ...]
+    margin: float
+    rounds: int
+
+
+class ChainProgram:
+    """The inequalities of one side on a growing sample of coordinates.
+
+    Args:
+        pairing: the inertias.
+        side: "highest" for ``c M_n - M_t > 0``, "lowest" for ``M_t - c M_n > 0``.
+    """
+
+    def __init__(self, pairing: InertiaPairing, side: Side) -> None:
+        """Choose the first coordinates and the scales."""
+        self.pairing, self.side = pairing, side
+        self._sign = 1.0 if side == "highest" else -1.0
+        self._joints = pairing.tree.joints
+        n = len(self._joints)
+        self._sizes = [1 if k == 0 else 6 for k in range(n - 1)]
+        self._scales = self._twist_scales()
+        self._samples = [_coordinates(joint.lower, joint.upper, ANGLES_PER_TURN) for joint in self._joints]
+
+    # ---- the inequalities ------------------------------------------------------------------------------------------
+
+    def _twist_scales(self) -> list[FloatArray]:
+        """For every body, one over the square roots of the diagonal of the design inertia it carries, (6,)."""
+        carried = np.zeros((6, 6))
+        scales = []
+        for joint, body in zip(reversed(self._joints), reversed(list(self.pairing.design)), strict=True):
+            carried = carried + body
+            scales.append(1.0 / np.sqrt(np.maximum(carried.diagonal(), 1e-9 * carried.diagonal().max())))
+            X = joint.motion_matrices(np.array(0.0))
+            carried = X.T @ carried @ X
+        return scales[::-1]
+
+    def blocks(self, k: int, coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The inequality of joint k (from 0) at coordinates (N,), for every choice of the body.
+
+        Returns:
+            Its part without unknowns (count N, s, s) and its derivatives with respect to all unknowns, (count N, u, s,
+            s); unknowns are c, then the scaled upper triangles of the storages. Scaled to about unit diagonal.
+        """
+        joint, pairing = self._joints[k], self.pairing
+        S = joint.twist[:, None]
+        if k == 0:
+            T = np.broadcast_to(S, (1, 6, 1))
+        else:
+            X = joint.motion_matrices(coordinates)
+            before = (
+                self._joints[0].twist[:, None] / np.sqrt(self._first_inertia())
+                if k == 1
+                else np.diag(self._scales[k - 1])
+            )
+            T = np.concatenate([X @ before, np.broadcast_to(S, (len(X), 6, 1))], axis=2)
+        size = T.shape[2]
+        unit = self._own_inertia(k) ** -0.5
+        T = np.concatenate([T[:, :, :-1], T[:, :, -1:] * unit], axis=2)
+        Tt = T.transpose(0, 2, 1)
+        rotor = np.zeros((size, size))
+        rotor[-1, -1] = unit**2
+        design = Tt @ pairing.design[k] @ T + rotor * pairing.design_rotors[k]
+        true = np.concatenate([Tt @ body @ T + rotor * pairing.true_rotors[k] for body in pairing.true[k]])
+        copies = len(pairing.true[k])
+        slope = np.zeros((len(T), self.unknowns, size, size))
+        slope[:, 0] = self._sign * design
+        if k > 0:
+            basis = _symmetric_basis(self._sizes[k - 1])
+            slope[:, self._places(k - 1), : size - 1, : size - 1] = -basis
+        if k < len(self._sizes):
+            if k == 0:
+                slope[:, self._places(0), 0, 0] = self._first_inertia() * unit**2
+            else:
+                inverse = np.diag(1.0 / self._scales[k])
+                own = inverse @ T
+                slope[:, self._places(k)] = np.einsum("nai,uab,nbj->nuij", own, _symmetric_basis(6), own, optimize=True)
+        return -self._sign * true, np.concatenate([slope] * copies)
+
+    def _first_inertia(self) -> float:
+        S = self._joints[0].twist
+        return float(S @ self.pairing.design[0] @ S + self.pairing.design_rotors[0]) or 1.0
+
+    def _own_inertia(self, k: int) -> float:
+        S = self._joints[k].twist
+        return float(S @ np.diag(self._scales[k] ** -2) @ S + self.pairing.design_rotors[k])
+
+    @property
+    def unknowns(self) -> int:
+        """c and the storages."""
+        return 1 + sum(s * (s + 1) // 2 for s in self._sizes)
+
+    def _places(self, storage: int) -> slice:
+        counts = [s * (s + 1) // 2 for s in self._sizes]
+        start = 1 + sum(counts[:storage])
+        return slice(start, start + counts[storage])
+
+    # ---- the programs ----------------------------------------------------------------------------------------------
+
+    def _stacked(self) -> list[tuple[FloatArray, FloatArray]]:
+        return [self.blocks(k, self._samples[k]) for k in range(len(self._joints))]
+
+    def best_bound(self) -> float | None:
+        """The best c on the samples; None if the solver has no answer."""
+        cost = np.zeros(self.unknowns)
+        cost[0] = self._sign
+        x = _solve(cost, [(F, G) for F, G in self._stacked()])
+        return None if x is None else float(x[0])
+
+    def widest(self, bound: float) -> tuple[FloatArray, float] | None:
+        """Storages with the largest common margin at a bound, and that margin; None if the solver has no answer."""
+        fixed = []
+        for F, G in self._stacked():
+            size = F.shape[-1]
+            margin = np.broadcast_to(-np.eye(size), (len(F), 1, size, size))
+            fixed.append((F + bound * G[:, 0], np.concatenate([margin, G[:, 1:]], axis=1)))
+        cost = np.zeros(self.unknowns)
+        cost[0] = -1.0
+        x = _solve(cost, fixed)
+        return None if x is None else (x[1:], float(x[0]))
+
+    def add_violators(self, bound: float, unknowns: FloatArray, margin: float) -> float:
+        """Add the coordinates of a dense sample where an inequality holds by less than half the margin.
+
+        Returns:
+            The smallest eigenvalue found.
+        """
+        smallest = np.inf
+        point = np.concatenate([[bound], unknowns])
+        for k in range(1, len(self._joints)):
+            dense = _coordinates(self._joints[k].lower, self._joints[k].upper, DENSE_ANGLES)
+            F, G = self.blocks(k, dense)
+            lowest = np.linalg.eigvalsh(F + np.einsum("u,nuij->nij", point, G))[:, 0]
+            lowest = lowest.reshape(len(self.pairing.true[k]), len(dense)).min(axis=0)
+            smallest = min(smallest, float(lowest.min()))
+            inner = np.r_[np.inf, lowest, np.inf]
+            worst = (lowest < 0.5 * margin) & (lowest <= inner[:-2]) & (lowest <= inner[2:])
+            self._samples[k] = np.unique(np.concatenate([self._samples[k], dense[worst]]))
+        return smallest
+
+    def storages(self, unknowns: FloatArray) -> tuple[FloatArray, ...]:
+        """Matrices in their own units, rounded to short binary numbers."""
+        matrices = []
+        for k, size in enumerate(self._sizes):
+            part = unknowns[self._places(k).start - 1 : self._places(k).stop - 1]
+            scaled = np.einsum("u,uij->ij", part, _symmetric_basis(size))
+            own = scaled * self._first_inertia() if k == 0 else scaled / np.outer(self._scales[k], self._scales[k])
+            step = 2.0 ** (np.ceil(np.log2(max(np.abs(own).max(), 1e-300))) - STORAGE_BITS)
+            matrices.append(np.round(own / step) * step)
+        return tuple(matrices)
+
+
+def find_storages(pairing: InertiaPairing, side: Side, spare: float = SPARE) -> Storages | None:
+    """Storages and bound of one side.
+
+    Args:
+        pairing: the inertias.
+        side: of the range of ``M_n^-1 M_t``.
+        spare: relative distance of the bound from the best one of the samples.
+
+    Returns:
+        None if the solver has no answer, or the rounds do not end.
+    """
+    program = ChainProgram(pairing, side)
+    outwards = 1.0 + spare if side == "highest" else 1.0 - spare
+    best = program.best_bound()
+    for round_number in range(ROUNDS):
+        if best is None:
+            return None
+        bound = best * outwards
+        found = program.widest(bound)
+        if found is None:
+            return None
+        unknowns, margin = found
+        if margin <= 0.0:
+            best = program.best_bound()
+            continue
+        smallest = program.add_violators(bound, unknowns, margin)
+        if smallest > 0.0:
+            return Storages(bound, program.storages(unknowns), smallest, round_number + 1)
+        best = program.best_bound()
+    return None
+
+
+def _coordinates(lower: float, upper: float, per_turn: int) -> FloatArray:
+    """Evenly spaced coordinates, ends included: so many a turn, and no fewer than a few."""
+    if not np.isfinite(upper - lower) or upper - lower >= 2.0 * pi:
+        return np.linspace(-pi, pi, per_turn, endpoint=False)
+    return np.linspace(lower, upper, max(FEWEST_ANGLES, round(per_turn * (upper - lower) / (2.0 * pi)) + 1))
+
+
+def _symmetric_basis(size: int) -> FloatArray:
+    """Symmetric matrices with a one at (i, j) and (j, i), i <= j, (count, size, size)."""
+    i, j = np.triu_indices(size)
+    basis = np.zeros((len(i), size, size))
+    basis[np.arange(len(i)), i, j] = 1.0
+    basis[np.arange(len(i)), j, i] = 1.0
+    return basis
+
+
+def _solve(cost: FloatArray, blocks: list[tuple[FloatArray, FloatArray]]) -> FloatArray | None:
+    """Minimise ``cost . x`` subject to ``F + sum x_u G_u >= 0`` for all blocks (N, s, s) and (N, u, s, s)."""
+    rows, offsets, cones = [], [], []
+    for F, G in blocks:
+        size = F.shape[-1]
+        j, i = np.tril_indices(size)  # upper triangle, column by column
+        weight = np.where(i == j, 1.0, np.sqrt(2.0))
+        offsets.append((F[:, i, j] * weight).ravel())
+        rows.append(-(G[:, :, i, j] * weight).transpose(0, 2, 1).reshape(-1, len(cost)))
+        cones += [clarabel.PSDTriangleConeT(size)] * len(F)
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.max_threads = 1
+    A = sparse.csc_matrix(np.vstack(rows))
+    quadratic = sparse.csc_matrix((len(cost), len(cost)))
+    solution = clarabel.DefaultSolver(quadratic, cost, A, np.concatenate(offsets), cones, settings).solve()
+    x = np.asarray(solution.x)
+    usable = str(solution.status) in {"Solved", "AlmostSolved", "InsufficientProgress"} and np.all(np.isfinite(x))
+    return x if usable else None
