@@ -52,4 +52,5 @@ PYBIND11_MODULE(_runtime, module) {
   bindings::bind_controller(module);
   bindings::bind_simulation(module);
   bindings::bind_loop(module);
+  bindings::bind_tree(module);
 }

@@ -78,6 +78,7 @@ SpringDiscParameters spring_disc(const Field& field, const std::string& source) 
 std::unique_ptr<Plant> make(const SerialArmParameters& arm) { return std::make_unique<SerialArm>(arm); }
 std::unique_ptr<Plant> make(const FiveBarParameters& five_bar) { return std::make_unique<FiveBar>(five_bar); }
 std::unique_ptr<Plant> make(const SpringDiscParameters& disc) { return std::make_unique<SpringDisc>(disc); }
+std::unique_ptr<Plant> make(const TreePlantParameters& tree) { return std::make_unique<TreePlant>(tree); }
 
 }  // namespace
 
@@ -92,7 +93,10 @@ PlantParameters read_plant(const Field& field, const std::string& source) {
   if (kind == "spring-disc") {
     return spring_disc(field, source);
   }
-  field["kind"].fail("\"" + kind + "\"", "\"serial-arm\", \"five-bar\" or \"spring-disc\"");
+  if (kind == "tree") {
+    return read_tree_plant(field);
+  }
+  field["kind"].fail("\"" + kind + "\"", "\"serial-arm\", \"five-bar\", \"spring-disc\" or \"tree\"");
 }
 
 std::unique_ptr<Plant> make_plant(const PlantParameters& parameters) {

@@ -10,11 +10,12 @@
 #include "quasilpv/plant.hpp"
 #include "quasilpv/serial_arm.hpp"
 #include "quasilpv/spring_disc.hpp"
+#include "quasilpv/tree_plant.hpp"
 
 namespace quasilpv {
 
 /// One alternative per plant kind of the scenario format.
-using PlantParameters = std::variant<SerialArmParameters, FiveBarParameters, SpringDiscParameters>;
+using PlantParameters = std::variant<SerialArmParameters, FiveBarParameters, SpringDiscParameters, TreePlantParameters>;
 
 /// Strict reading of the member `plant` of a scenario; `source` names the file in errors. INIT-ONLY. Throws InputError.
 PlantParameters read_plant(const Field& field, const std::string& source);

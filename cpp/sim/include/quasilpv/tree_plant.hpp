@@ -1,0 +1,59 @@
+// A robot in space as a plant.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "quasilpv/kinematic_tree.hpp"
+#include "quasilpv/plant.hpp"
+
+namespace quasilpv {
+
+/// Friction of one joint, N m: viscous f w, and Coulomb friction smoothed to c tanh(w / w0).
+struct JointFriction {
+  double viscous_nm_s = 0.0;          ///< f >= 0
+  double coulomb_nm = 0.0;            ///< c >= 0
+  double coulomb_speed_rad_s = 1e-3;  ///< w0 > 0: below it the joint creeps instead of sticking
+};
+
+/// Physical parameters of a robot in space, its payload merged into the last body; 1 to 7 joints.
+struct TreePlantParameters {
+  std::string label;
+  KinematicTree tree;
+  std::vector<JointFriction> friction;  ///< one per joint
+};
+
+/// The member `plant` of a scenario, kind `tree`. INIT-ONLY. Throws InputError.
+TreePlantParameters read_tree_plant(const Field& field);
+
+/// The robot as a plant, y = (q, w): joint coordinates (rad; m for a joint that slides) and their rates.
+///
+///     q' - w = 0
+///     M(q) w' + h(q, w) + f w + c tanh(w / w0) - torque = 0
+///
+/// M and h as in TreeDynamics. Source: Featherstone 2008, chapters 5 and 6.
+class TreePlant final : public Plant {
+ public:
+  /// INIT-ONLY.
+  explicit TreePlant(TreePlantParameters parameters);
+
+  const TreePlantParameters& parameters() const noexcept { return parameters_; }
+  const TreeDynamics& dynamics() const noexcept { return dynamics_; }
+
+  int joints() const noexcept override { return dynamics_.joints(); }
+  int size() const noexcept override { return 2 * dynamics_.joints(); }
+  Eigen::VectorXd initial_state(const JointArray& angle, const JointArray& speed) const override;
+  void residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept override;
+  void jacobian(double t, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept override;
+  void derivative(double t, ConstVector y, Vector y_dot) const override;
+  PlantSample sample(double t, ConstVector y) const override;
+
+ private:
+  TreeVector friction(ConstVector speed) const noexcept;
+
+  TreePlantParameters parameters_;
+  TreeDynamics dynamics_;
+};
+
+}  // namespace quasilpv

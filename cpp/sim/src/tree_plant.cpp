@@ -1,0 +1,119 @@
+#include "quasilpv/tree_plant.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "format_number.hpp"
+#include "quasilpv/errors.hpp"
+
+namespace quasilpv {
+namespace {
+
+// See SerialArm: below this fraction of a diagonal entry, accelerations have lost all but four of their digits.
+constexpr double kSmallestPivotRatio = 1e-12;
+
+JointFriction read_friction(const Field& joint) {
+  JointFriction friction;
+  friction.viscous_nm_s = joint["friction_viscous_nm_s"].non_negative();
+  friction.coulomb_nm = joint["friction_coulomb_nm"].non_negative();
+  friction.coulomb_speed_rad_s = joint["coulomb_speed_rad_s"].positive();
+  return friction;
+}
+
+JointArray joint_array(Plant::ConstVector x) noexcept {
+  JointArray array{};
+  std::copy(x.data(), x.data() + x.size(), array.begin());
+  return array;
+}
+
+}  // namespace
+
+TreePlantParameters read_tree_plant(const Field& field) {
+  field.only({"kind", "label", "gravity_m_s2", "joints"});
+  TreePlantParameters parameters;
+  parameters.label = field["label"].text();
+  parameters.tree = read_tree(field);
+  const Field joints = field["joints"];
+  for (std::size_t k = 0; k < joints.size(); ++k) {
+    joints.at(k).only({"name", "kind", "rotation", "translation_m", "axis", "mass_kg", "first_moment_kg_m",
+                       "rotational_kg_m2", "rotor_inertia_kg_m2", "friction_viscous_nm_s", "friction_coulomb_nm",
+                       "coulomb_speed_rad_s"});
+    parameters.friction.push_back(read_friction(joints.at(k)));
+  }
+  return parameters;
+}
+
+TreePlant::TreePlant(TreePlantParameters parameters)
+    : parameters_(std::move(parameters)), dynamics_(parameters_.tree) {}
+
+Eigen::VectorXd TreePlant::initial_state(const JointArray& angle, const JointArray& speed) const {
+  const int n = joints();
+  Eigen::VectorXd y(size());
+  y.head(n) = Eigen::Map<const Eigen::VectorXd>(angle.data(), n);
+  y.tail(n) = Eigen::Map<const Eigen::VectorXd>(speed.data(), n);
+  return y;
+}
+
+TreeVector TreePlant::friction(ConstVector speed) const noexcept {
+  TreeVector torque(joints());
+  for (int k = 0; k < joints(); ++k) {
+    const JointFriction& own = parameters_.friction[static_cast<std::size_t>(k)];
+    torque[k] = own.viscous_nm_s * speed[k] + own.coulomb_nm * std::tanh(speed[k] / own.coulomb_speed_rad_s);
+  }
+  return torque;
+}
+
+void TreePlant::residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept {
+  const int n = joints();
+  const JointArray torque = joint_torque(t);
+  residual.head(n) = y_dot.head(n) - y.tail(n);
+  TreeVector moving(n);
+  dynamics_.inverse_dynamics(y.data(), y.data() + n, y_dot.data() + n, moving.data());
+  residual.tail(n) = moving + friction(y.tail(n)) - Eigen::Map<const Eigen::VectorXd>(torque.data(), n);
+}
+
+void TreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept {
+  const int n = joints();
+  TreeMatrix by_coordinate;
+  TreeMatrix by_speed;
+  dynamics_.derivatives(y.data(), y.data() + n, y_dot.data() + n, by_coordinate, by_speed);
+  for (int k = 0; k < n; ++k) {
+    const JointFriction& own = parameters_.friction[static_cast<std::size_t>(k)];
+    const double slope = 1.0 / std::cosh(std::min(std::abs(y[n + k]) / own.coulomb_speed_rad_s, 300.0));
+    by_speed(k, k) += own.viscous_nm_s + own.coulomb_nm / own.coulomb_speed_rad_s * slope * slope;
+  }
+  jacobian.topLeftCorner(n, n).setIdentity();
+  jacobian.topLeftCorner(n, n) *= c_j;
+  jacobian.topRightCorner(n, n).setIdentity();
+  jacobian.topRightCorner(n, n) *= -1.0;
+  jacobian.bottomLeftCorner(n, n) = by_coordinate;
+  jacobian.bottomRightCorner(n, n) = by_speed + c_j * dynamics_.inertia(y.data());
+}
+
+void TreePlant::derivative(double t, ConstVector y, Vector y_dot) const {
+  const int n = joints();
+  const TreeMatrix mass = dynamics_.inertia(y.data());
+  const Eigen::LLT<TreeMatrix> cholesky(mass);
+  const TreeVector pivots = cholesky.matrixLLT().diagonal().array().square();
+  if (cholesky.info() != Eigen::Success || !(pivots.array() > kSmallestPivotRatio * mass.diagonal().array()).all()) {
+    throw PlantError("tree '" + parameters_.label + "': singular mass matrix at t = " + format_number(t) + " s");
+  }
+  const JointArray torque = joint_torque(t);
+  const TreeVector rest = TreeVector::Zero(n);
+  TreeVector motion(n);
+  dynamics_.inverse_dynamics(y.data(), y.data() + n, rest.data(), motion.data());
+  y_dot.head(n) = y.tail(n);
+  y_dot.tail(n) = cholesky.solve(Eigen::Map<const Eigen::VectorXd>(torque.data(), n) - motion - friction(y.tail(n)));
+}
+
+PlantSample TreePlant::sample(double t, ConstVector y) const {
+  const int n = joints();
+  Eigen::VectorXd y_dot(size());
+  derivative(t, y, y_dot);
+  return {joint_array(y.head(n)), joint_array(y.tail(n)), joint_array(y_dot.tail(n)), external_torque().at(t)};
+}
+
+}  // namespace quasilpv
