@@ -24,6 +24,7 @@ LAYERS = (
     {"synthesis"},
     {"certificate"},
     {"artifact"},
+    {"descriptions"},
     {"trajectories", "_runtime", "release"},
     {"scenarios"},
     {"telemetry"},

@@ -104,16 +104,16 @@ class DescribedTree:
             raise InputError(self.source, "tip_link", "nothing", f"the link to control, one of the ends: {ends}")
         return self.tips[-1]
 
-    def chain(self, tip: str, locked: Mapping[str, float]) -> Chain:
-        """The joints from the base to a frame, all other bodies merged into the ones that carry them.
+    def moving(self, tip: str, locked: Mapping[str, float]) -> tuple[DescribedJoint, ...]:
+        """The joints on the way from the base to a frame that are not held.
 
         Args:
             tip: a frame.
             locked: coordinates of joints that are held, by name.
 
         Raises:
-            InputError: a locked joint does not exist, a joint behind a moving body is neither on the way to the tip nor
-                locked, a joint copies another one, or is of a kind that no chain can have.
+            InputError: a locked joint does not exist, a joint copies another one, or is of a kind that no chain can
+                have.
         """
         names = [joint.name for joint in self.joints]
         for name, value in locked.items():
@@ -121,20 +121,48 @@ class DescribedTree:
                 raise InputError(self.source, f"locked.{name}", name, one_of(names, name))
             if not isfinite(value):
                 raise InputError(self.source, f"locked.{name}", value, "a finite number, rad or m")
-        return _ChainOf(self, tip, locked).chain()
+        on_way = [self.joints[k] for k in self.way(tip) if self.joints[k].name not in locked]
+        for joint in on_way:
+            self._require_drivable(joint)
+        return tuple(on_way)
 
+    def way(self, tip: str) -> list[int]:
+        """Indices of the joints from the base to a frame, in this order."""
+        k, _ = self.frames[tip]
+        way = []
+        while k != BASE:
+            way.append(k)
+            k = self.joints[k].parent
+        return way[::-1]
 
-@dataclass(frozen=True, eq=False)
-class Chain:
-    """A chain, and what the description says of its joints.
+    def _require_drivable(self, joint: DescribedJoint) -> None:
+        field_name = f"joint {joint.name}"
+        if joint.follows is not None:
+            expected = f"a joint of its own, or held: locked.{joint.name} = a coordinate"
+            raise InputError(self.source, field_name, f"a copy of {joint.follows}", expected)
+        if joint.kind is None:
+            expected = "revolute, continuous or prismatic, or a chain that does not need it"
+            raise InputError(self.source, field_name, f"a {joint.written_kind} joint", expected)
 
-    Attributes:
-        tree: the chain; its rotor inertias are those of the file, 0 where it has none.
-        described: its joints in the file's words.
-    """
+    def chain(
+        self, tip: str, locked: Mapping[str, float], limits: Mapping[str, tuple[float, float]] | None = None
+    ) -> KinematicTree:
+        """The joints from the base to a frame, all other bodies merged into the ones that carry them.
 
-    tree: KinematicTree
-    described: tuple[DescribedJoint, ...]
+        Args:
+            tip: a frame.
+            locked: coordinates of joints that are held, by name.
+            limits: intervals of the coordinates that replace those of the file, by name.
+
+        Returns:
+            The chain; its rotor inertias are those of the file, 0 where it has none.
+
+        Raises:
+            InputError: a joint behind a moving body is neither on the way to the tip nor locked, limits are missing, or
+                `moving` refuses a joint.
+        """
+        self.moving(tip, locked)
+        return _ChainOf(self, tip, locked, limits or {}).chain()
 
 
 @dataclass
@@ -144,18 +172,18 @@ class _ChainOf:
     described: DescribedTree
     tip: str
     locked: Mapping[str, float]
+    limits: Mapping[str, tuple[float, float]]
     carried_by: list[int] = field(default_factory=list)
     inside: list[Placement] = field(default_factory=list)
 
-    def chain(self) -> Chain:
+    def chain(self) -> KinematicTree:
         """The chain; see `DescribedTree.chain`."""
         joints = self.described.joints
-        on_way = self._way()
+        on_way = set(self.described.way(self.tip))
         inertias: dict[int, SpatialInertia] = {}
         for k, joint in enumerate(joints):
             below = (BASE, Placement.identity()) if joint.parent == BASE else self._of(joint.parent)
             if k in on_way and joint.name not in self.locked:
-                self._require_drivable(joint)
                 self._put(k, Placement.identity())
                 inertias[k] = joint.inertia
                 continue
@@ -170,14 +198,6 @@ class _ChainOf:
         moving = [k for k in range(len(joints)) if self.carried_by[k] == k]
         return self._assembled(moving, inertias)
 
-    def _way(self) -> set[int]:
-        k, _ = self.described.frames[self.tip]
-        way = set()
-        while k != BASE:
-            way.add(k)
-            k = self.described.joints[k].parent
-        return way
-
     def _of(self, k: int) -> tuple[int, Placement]:
         return self.carried_by[k], self.inside[k]
 
@@ -185,19 +205,11 @@ class _ChainOf:
         self.carried_by.append(carrier)
         self.inside.append(place)
 
-    def _require_drivable(self, joint: DescribedJoint) -> None:
-        field_name = f"joint {joint.name}"
-        if joint.follows is not None:
-            expected = f"a joint of its own, or held: locked.{joint.name} = a coordinate"
-            raise InputError(self.described.source, field_name, f"a copy of {joint.follows}", expected)
-        if joint.kind is None:
-            expected = "revolute, continuous or prismatic, or a chain that does not need it"
-            raise InputError(self.described.source, field_name, f"a {joint.written_kind} joint", expected)
-
-    def _assembled(self, moving: list[int], inertias: Mapping[int, SpatialInertia]) -> Chain:
-        described = [self.described.joints[k] for k in moving]
+    def _assembled(self, moving: list[int], inertias: Mapping[int, SpatialInertia]) -> KinematicTree:
         chain = []
-        for k, joint in zip(moving, described, strict=True):
+        for k in moving:
+            joint = self.described.joints[k]
+            lower, upper = self.limits.get(joint.name, (joint.lower, joint.upper))
             before = Placement.identity() if joint.parent == BASE else self.inside[joint.parent]
             assert joint.kind is not None
             chain.append(
@@ -208,11 +220,10 @@ class _ChainOf:
                     axis=joint.axis,
                     inertia=inertias[k],
                     rotor_inertia_kg_m2=joint.rotor_inertia_kg_m2 or 0.0,
-                    lower=joint.lower,
-                    upper=joint.upper,
+                    lower=lower,
+                    upper=upper,
                 )
             )
         at, place = self.described.frames[self.tip]
         tool = self.inside[at].then(place) if at != BASE else place
-        tree = KinematicTree(self.described.name, tuple(chain), tool, self.described.gravity_m_s2)
-        return Chain(tree, tuple(described))
+        return KinematicTree(self.described.name, tuple(chain), tool, self.described.gravity_m_s2)

@@ -127,7 +127,7 @@ def _axis(pin: Any, model: Any, k: int) -> FloatArray:
     parent = model.parents[k]
     twist = data.v[k] - data.liMi[k].actInv(data.v[parent])
     moved = np.array(twist.angular) + np.array(twist.linear)
-    return moved / np.linalg.norm(moved)
+    return np.asarray(moved / np.linalg.norm(moved))
 
 
 def _usable(limit: ElementTree.Element | None, attribute: str, largest: float) -> float | None:
