@@ -61,6 +61,7 @@ class Verb:
 
 VERBS: Mapping[str, Verb] = {
     "demo": Verb("demo", "The main job: design, track, table and figures."),
+    "robot": Verb("robot", "A robot of your own, from its URDF or MJCF."),
     "list": Verb("listing", "What there is: robots, controllers, scenarios, conditions."),
     "synth": Verb("synth", "Design a controller and write its artifact."),
     "inspect": Verb("inspect", "What is in an artifact."),

@@ -13,7 +13,7 @@ LONGEST = 300
 
 @contextmanager
 def captured_stderr() -> Iterator[Callable[[], str]]:
-    """Keep what anything in this process writes to file descriptor 2; yields a function that returns it in one line."""
+    """Keep what is written to file descriptor 2; yields a function that returns the errors among it, in one line."""
     sys.stderr.flush()
     kept = os.dup(2)
     with tempfile.TemporaryFile() as file:
@@ -21,7 +21,7 @@ def captured_stderr() -> Iterator[Callable[[], str]]:
         def said() -> str:
             file.seek(0)
             text = file.read().decode(errors="replace")
-            return " ".join(text.replace("Error:", " ").split())[:LONGEST]
+            return " ".join(text.partition("Error:")[2].replace("Error:", " ").split())[:LONGEST]
 
         try:
             os.dup2(file.fileno(), 2)

@@ -1,4 +1,4 @@
-"""Whether the numbers of a description can belong to a robot: refusals where they cannot, concerns where they hardly can.
+"""Whether the numbers of a description can belong to a robot: refused where they cannot, doubted where they hardly can.
 
 Looked at are the bodies that move, after everything fixed to them was merged into them: a link without inertia of its
 own is common, and harmless once it is part of another.

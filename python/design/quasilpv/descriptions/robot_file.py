@@ -24,6 +24,7 @@ from quasilpv.descriptions.safe_xml import read_xml, root_of
 from quasilpv.descriptions.spatial_robot import PayloadBody, SpatialJoint, SpatialRobot
 from quasilpv.descriptions.urdf import read_urdf
 from quasilpv.errors import InputError, one_of
+from quasilpv.files import read_bytes
 from quasilpv.systems.spatial import Placement
 from quasilpv.systems.tree import JointKind
 
@@ -166,10 +167,7 @@ def read_robot_file(path: Path) -> RobotSource:
     Raises:
         InputError: the file cannot be read, is no TOML, breaks a rule of the schema, or its description does.
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(str(path), "file", error.strerror or error, "a readable file") from error
+    content = read_bytes(path)
     if len(content) > MOST_BYTES:
         raise InputError(str(path), "size", f"{len(content)} bytes", f"at most {MOST_BYTES}")
     try:

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 from xml.parsers import expat
 
 from quasilpv.errors import InputError
+from quasilpv.files import read_bytes
 
 MOST_BYTES = 16 << 20
 MOST_DEPTH = 200
@@ -19,10 +20,7 @@ def read_xml(path: Path) -> str:
     Raises:
         InputError: the file cannot be read, is too large, is no XML, is nested too deeply, or has a document type.
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(str(path), "file", error.strerror or error, "a readable file") from error
+    content = read_bytes(path)
     if len(content) > MOST_BYTES:
         raise InputError(str(path), "size", f"{len(content)} bytes", f"at most {MOST_BYTES}")
     _check(path, content)

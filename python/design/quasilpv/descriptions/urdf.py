@@ -54,7 +54,8 @@ def is_xacro(root: ElementTree.Element) -> bool:
     """Whether joints and links of a file come from macros or expressions that have not been evaluated."""
     if any(element.tag.endswith(("}macro", "}include", "}property", "}arg", "}if", "}unless")) for element in root):
         return True
-    written = (value for element in root.findall("joint") for part in element.iter() for value in part.attrib.values())
+    elements = [*root.findall("joint"), *root.findall("link")]
+    written = (value for element in elements for part in element.iter() for value in part.attrib.values())
     return any("${" in value for value in written)
 
 
@@ -62,10 +63,13 @@ def _built(pin: Any, path: Path, text: str) -> Any:
     """The library's model; what it prints on stderr becomes the reason of a refusal."""
     with captured_stderr() as said:
         try:
-            return pin.buildModelFromXML(text)
+            model = pin.buildModelFromXML(text)
         except Exception as error:  # whatever the library throws at a text it cannot take
             reason = said() or str(error).strip() or type(error).__name__
             raise InputError(str(path), "file", reason, "a URDF") from error
+        if said():  # it goes on without what it could not read, an inertia for example
+            raise InputError(str(path), "file", said(), "a URDF")
+        return model
 
 
 def _pinocchio(path: Path) -> Any:
