@@ -1,4 +1,4 @@
-"""Robots in space on the run-time side: the same motion as in Pinocchio and in Python; the plant under both integrators."""
+"""Robots in space on the run-time side: the same motion as in Pinocchio and in Python, and the plant."""
 
 import numpy as np
 import pinocchio as pin

@@ -197,5 +197,30 @@ class PlantSession:
     def advance(self, torque: npt.ArrayLike) -> None:
         """Integrate over the sample under a torque (N m)."""
 
+class Tree:
+    """The motion of a robot in space, as the run-time side computes it."""
+
+    def __init__(self, document: Any) -> None:
+        """From a document of kind `tree`."""
+
+    @property
+    def joints(self) -> int: ...
+    def torque_at_rest(self, coordinate: npt.ArrayLike, acceleration: npt.ArrayLike) -> _Array:
+        """M(q) a + G(q), N m, shape (joints,)."""
+
+    def inverse_dynamics(self, coordinate: npt.ArrayLike, speed: npt.ArrayLike, acceleration: npt.ArrayLike) -> _Array:
+        """M(q) a + h(q, w), N m, shape (joints,)."""
+
+    def inertia(self, coordinate: npt.ArrayLike) -> _Array:
+        """M(q), kg m^2, shape (joints, joints)."""
+
+    def derivatives(
+        self, coordinate: npt.ArrayLike, speed: npt.ArrayLike, acceleration: npt.ArrayLike
+    ) -> tuple[_Array, _Array]:
+        """Of inverse_dynamics with respect to coordinates and speeds, two arrays of shape (joints, joints)."""
+
+    def energy(self, coordinate: npt.ArrayLike, speed: npt.ArrayLike) -> float:
+        """Kinetic plus potential, J."""
+
 def run_closed_loop(artifact: Artifact, trajectory: Trajectory, scenario: Scenario) -> dict[str, _Array]:
     """The closed loop in lock-step: columns by name, shape (samples,) or (samples, joints)."""

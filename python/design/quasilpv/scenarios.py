@@ -126,6 +126,47 @@ class SpringDiscPlant(StrictModel):
         return 1
 
 
+Row = tuple[float, float, float]
+
+
+class TreeJoint(StrictModel):
+    """One joint of a robot in space and the body it carries; the inertia is about the joint's frame.
+
+    Attributes:
+        rotation, translation_m: of the joint's frame at coordinate 0 in the frame before; rows of the rotation.
+        rotor_inertia_kg_m2: reflected to the joint.
+        coulomb_speed_rad_s: speed w0 in the friction torque ``viscous w + coulomb tanh(w / w0)``.
+    """
+
+    name: str
+    kind: Literal["revolute", "continuous", "prismatic"]
+    rotation: tuple[Row, Row, Row]
+    translation_m: Row
+    axis: Row
+    mass_kg: NonNegative
+    first_moment_kg_m: Row
+    rotational_kg_m2: tuple[Row, Row, Row]
+    rotor_inertia_kg_m2: NonNegative
+    friction_viscous_nm_s: NonNegative
+    friction_coulomb_nm: NonNegative
+    coulomb_speed_rad_s: Positive
+
+
+class TreePlant(StrictModel):
+    """A robot in space, its payload merged into its last body; gravity in the axes of the base."""
+
+    kind: Literal["tree"] = "tree"
+    label: str
+    gravity_m_s2: Row
+    # Whether rotations are rotations and bodies have positive energy, the simulator decides.
+    chain: Annotated[tuple[TreeJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
+
+    @property
+    def joints(self) -> int:
+        """Actuated and measured joints."""
+        return len(self.chain)
+
+
 class IdaIntegrator(StrictModel):
     """SUNDIALS IDA (variable-order BDF) with its error tolerances."""
 
@@ -166,10 +207,10 @@ class InitialState(StrictModel):
     speed_rad_s: Vector
 
 
-Plant = Annotated[SerialArmPlant | FiveBarPlant | SpringDiscPlant, Field(discriminator="kind")]
+Plant = Annotated[SerialArmPlant | FiveBarPlant | SpringDiscPlant | TreePlant, Field(discriminator="kind")]
 Integrator = Annotated[IdaIntegrator | Rk4Integrator, Field(discriminator="kind")]
 
-TAGS = ("serial-arm", "five-bar", "spring-disc", "ida", "rk4")
+TAGS = ("serial-arm", "five-bar", "spring-disc", "tree", "ida", "rk4")
 """The kinds that tell the cases of a union apart."""
 
 
