@@ -44,6 +44,7 @@ NOT_RUN = {
     "design reproduce --all": "test_reproduction.py runs every item",
     "design view ": "ends when its reader says so; test_view.py opens it",
     "python examples/four_link_arm.py": "test_new_robot.py runs it",
+    "design robot show tests/": "test_descriptions.py shows the same files, which are not where this runs",
     "qlpv-controller --doctor ": "measures the machine; doctor_test.cpp",
 }
 """Beginnings of lines in console blocks that no test runs, and why."""
