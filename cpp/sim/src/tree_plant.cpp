@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "format_number.hpp"
+#include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {
