@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
-from quasilpv.descriptions.described_tree import DescribedTree
-from quasilpv.descriptions.inertia_range import InertiaRange, proved_inertia_range
-from quasilpv.descriptions.plausibility import concerns, require_bodies
-from quasilpv.descriptions.robot_file import read_description, read_robot_file
-from quasilpv.descriptions.spatial_robot import SpatialRobot
-from quasilpv.descriptions.starting_file import starting_file
 from quasilpv.errors import InputError
 from quasilpv.files import write_atomically
+
+if TYPE_CHECKING:
+    from quasilpv.descriptions.described_tree import DescribedTree
+    from quasilpv.descriptions.inertia_range import InertiaRange
+    from quasilpv.descriptions.spatial_robot import SpatialRobot
 
 
 def robot_command(
@@ -43,6 +42,8 @@ def robot_command(
       design robot show ur5.urdf -o robot.toml
       design robot show robot.toml --prove
     """
+    from quasilpv.descriptions.robot_file import read_description
+
     del action
     if file.suffix == ".toml":
         if tip is not None or out is not None:
@@ -57,6 +58,8 @@ def robot_command(
 
 
 def _show_description(file: Path, described: DescribedTree, tip: str | None, out: Path | None, *, json: bool) -> None:
+    from quasilpv.descriptions.starting_file import starting_file
+
     chosen = described.tip(tip)
     followers = {joint.name: 0.0 for joint in described.joints if joint.follows is not None}
     joints = described.moving(chosen, followers)
@@ -86,6 +89,10 @@ def _described_row(joint: Any) -> dict[str, Any]:
 
 
 def _show_robot(file: Path, *, prove: bool, accept_inertias: bool, json: bool) -> int:
+    from quasilpv.descriptions.inertia_range import proved_inertia_range
+    from quasilpv.descriptions.plausibility import concerns, require_bodies
+    from quasilpv.descriptions.robot_file import read_robot_file
+
     robot = read_robot_file(file).robot()
     require_bodies(robot.tree, str(file), accept_triangle=accept_inertias)
     doubts = concerns(robot.tree)
