@@ -74,5 +74,6 @@ def setup(app: Sphinx) -> None:
     run_doxygen()
     app.connect("autodoc-skip-member", is_noise)
 
+
 # Two rooms have a class Robot: the robot itself, and the member of an artifact that names it.
 suppress_warnings = ["ref.python"]
