@@ -46,7 +46,9 @@ class Call:
 
 
 QUESTION = {"--condition": "II.6"}
+ROBOT = str(Path(__file__).parents[1] / "data" / "robots" / "two_links.xml")
 VERB_ARGUMENTS = {
+    "robot": Call(("show", ROBOT)),
     "demo": Call(stubs=("cli.synth.write_released",)),
     "list": Call(),
     "synth": Call(("arm3",), {"--design": "pid"}),

@@ -36,12 +36,15 @@ READER_LEFT = 141
 
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """An artifact with everything that can be checked, and a log."""
+    """An artifact with everything that can be checked, a log, and the description of a robot."""
     folder = tmp_path_factory.mktemp("inputs")
     artifact = release("arm2", "dob-acceleration", Specification()).artifact
     experiment = TrackingExperiment("hold", robot("arm2"), rest("hold", 2, 0.05), external_torque=())
     track(experiment, artifact, folder, plant="nominal", sensors=Sensors())
-    return {"ARTIFACT": str(write_artifact(folder, artifact)[0]), "LOG": str(folder / LOG_NAME)}
+    described = folder / ROBOT.name
+    described.write_bytes(ROBOT.read_bytes())
+    artifact_path = write_artifact(folder, artifact)[0]
+    return {"ARTIFACT": str(artifact_path), "LOG": str(folder / LOG_NAME), "ROBOT": str(described)}
 
 
 # ---- calls -----------------------------------------------------------------------------------------------------------
@@ -67,7 +70,9 @@ class Call:
 
 RELEASED = {"artifact": {}, "name": "name", "report": {}, "verification": {}}
 QUESTION = ("ex-I.1", "--condition", "II.6")
+ROBOT = Path(__file__).parents[1] / "data" / "robots" / "two_links.xml"
 CALLS = {
+    "robot": Call(("show", "ROBOT"), file=True),
     "demo": Call(
         (),
         (("cli.synth.write_released", RELEASED), ("cli.track.run_all", []), ("cli.session.draw_results", None)),

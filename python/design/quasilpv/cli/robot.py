@@ -9,7 +9,7 @@ import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
 from quasilpv.errors import InputError
-from quasilpv.files import write_atomically
+from quasilpv.files import claim_file, write_atomically
 
 if TYPE_CHECKING:
     from quasilpv.descriptions.described_tree import DescribedTree
@@ -60,6 +60,8 @@ def robot_command(
 def _show_description(file: Path, described: DescribedTree, tip: str | None, out: Path | None, *, json: bool) -> None:
     from quasilpv.descriptions.starting_file import starting_file
 
+    if out is not None:
+        claim_file(out)
     chosen = described.tip(tip)
     followers = {joint.name: 0.0 for joint in described.joints if joint.follows is not None}
     joints = described.moving(chosen, followers)
