@@ -90,7 +90,7 @@ def test_an_equation_is_left_minus_right() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "__import__('os').system('touch /tmp/owned')",
+        "__import__('os').system('touch owned')",
         "__import__",
         "x.__class__",
         "x.diff(t)",
