@@ -28,7 +28,8 @@ from quasilpv.trajectories import (
 )
 from quasilpv.trajectories.library import CIRCLE, SQUARE
 from quasilpv.trajectories.paths import MAX_DURATION_S, ArcSegment, LineSegment, Segment, septic
-from quasilpv.trajectories.planning import MIN_SINGULARITY, joint_motion, quintic_hermite
+from quasilpv.trajectories.planned import MIN_SINGULARITY, joint_motion
+from quasilpv.trajectories.quintics import quintic_hermite
 
 ARM = robot("arm3").model
 L1, L2, L3 = 1.0, 0.9, 0.8

@@ -35,7 +35,7 @@ from quasilpv.synthesis.actuator_demand import Motion
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.systems.registry import Robot
 from quasilpv.trajectories import Trajectory, fivebar_spiral, rest, serial_circle, serial_square
-from quasilpv.trajectories.planning import Kinematics
+from quasilpv.trajectories.planned import Kinematics
 
 Tolerance = Annotated[float, Field(ge=1.0 / LARGEST_NUMBER, le=0.1)]
 Duration = Annotated[float, Field(ge=1.0 / LARGEST_NUMBER, le=86400)]

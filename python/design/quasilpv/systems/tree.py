@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import cached_property
 from math import inf, isfinite, pi
 
 import numpy as np
@@ -98,6 +99,12 @@ class TreeJoint:
         """S, (6,): the twist of the body at unit speed, in its own frame."""
         none = np.zeros(3)
         return np.concatenate([none, self.axis] if self.turns else [self.axis, none])
+
+    @cached_property
+    def axis_products(self) -> tuple[FloatArray, FloatArray]:
+        """[a] and [a]^2, 3 x 3, of the axis a."""
+        K = cross_matrix(self.axis)
+        return K, K @ K
 
     def motion_matrices(self, coordinate: FloatArray) -> FloatArray:
         """X(q), (..., 6, 6), at coordinates (...)."""
@@ -188,20 +195,68 @@ class KinematicTree:
 
     def tool_pose(self, q: ArrayLike) -> Placement:
         """Placement of the tool's frame in the base, at coordinates (n,)."""
-        pose = Placement.identity()
-        for joint, coordinate in zip(self.joints, self.coordinates(q), strict=True):
-            pose = pose.then(joint.placement)
-            if joint.turns:
-                pose = pose.then(Placement.turned(joint.axis, float(coordinate)))
-            else:
-                pose = pose.then(Placement(np.eye(3), joint.axis * coordinate))
-        return pose.then(self.tool)
+        return Placement(*self._frames(self.coordinates(q))[-1])
 
     def tool_jacobian(self, q: ArrayLike) -> FloatArray:
         """J of the tool, (6, n), its twist in the axes of the base and its own origin."""
-        own = self.tool.motion_matrix @ self.jacobians(q)[-1]
-        R = self.tool_pose(q).rotation
-        return np.vstack([R @ own[:3], R @ own[3:]])
+        frames = self._frames(self.coordinates(q))
+        tip, J = frames[-1][1], np.zeros((6, self.order))
+        for k, (joint, (R, origin)) in enumerate(zip(self.joints, frames[:-1], strict=True)):
+            axis = R @ joint.axis
+            J[:3, k] = cross_matrix(axis) @ (tip - origin) if joint.turns else axis
+            J[3:, k] = axis if joint.turns else 0.0
+        return J
+
+    def tool_drift(self, q: ArrayLike, speed: ArrayLike) -> FloatArray:
+        """(dJ/dt) q', (6,): the acceleration of the tool's origin and of its orientation while joints keep their speed.
+
+        In the axes of the base. A column (a x p; a) of J, p from the joint to the tool, changes by
+        ``(w x a) x p + a x p'`` and ``w x a``, with w the angular velocity of the axis.
+        """
+        frames, w = self._frames(self.coordinates(q)), self.coordinates(speed)
+        arms = [
+            (R @ joint.axis, frames[-1][1] - origin) for joint, (R, origin) in zip(self.joints, frames, strict=False)
+        ]
+        drift, turning = np.zeros(6), np.zeros(3)
+        before = np.zeros(3)  # velocity of the joint's origin relative to the base
+        tip = self.tool_jacobian(q)[:3] @ w
+        for k, (joint, (axis, arm)) in enumerate(zip(self.joints, arms, strict=True)):
+            if k:
+                last_axis, last_arm = arms[k - 1]
+                before = before + cross_matrix(turning) @ (last_arm - arm)
+                if not self.joints[k - 1].turns:
+                    before = before + last_axis * w[k - 1]
+            turned = cross_matrix(turning) @ axis * w[k]
+            if joint.turns:
+                drift[:3] += cross_matrix(turned) @ arm + cross_matrix(axis * w[k]) @ (tip - before)
+                drift[3:] += turned
+                turning = turning + axis * w[k]
+            else:
+                drift[:3] += turned
+        return drift
+
+    def _frames(self, q: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """Rotation and origin of every joint's frame in the base, then those of the tool."""
+        frames = []
+        R, origin = np.eye(3), np.zeros(3)
+        for joint, coordinate in zip(self.joints, q, strict=True):
+            origin = origin + R @ joint.placement.translation_m
+            R = R @ joint.placement.rotation
+            if joint.turns:
+                K, K2 = joint.axis_products
+                R = R + R @ (np.sin(coordinate) * K + (1.0 - np.cos(coordinate)) * K2)
+            else:
+                origin = origin + R @ (joint.axis * coordinate)
+            frames.append((R, origin))
+        frames.append((R @ self.tool.rotation, origin + R @ self.tool.translation_m))
+        return frames
+
+    @property
+    def reach_m(self) -> float:
+        """Sum of the distances between neighbouring frames, tool included: no point of it is farther from the base."""
+        frames = [*(joint.placement for joint in self.joints), self.tool]
+        sliding = sum(max(abs(joint.lower), abs(joint.upper)) for joint in self.joints if not joint.turns)
+        return float(sum(np.linalg.norm(frame.translation_m) for frame in frames)) + sliding
 
     # ---- dynamics --------------------------------------------------------------------------------------------------
 

@@ -24,6 +24,7 @@ from quasilpv.artifact.programs import MAX_JOINTS
 from quasilpv.artifact.strict_model import FieldError, Number, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import read_bytes, write_atomically
+from quasilpv.trajectories.quintics import least_jerk, quintic_hermite
 
 Array = npt.NDArray[np.float64]
 Quintic = tuple[Number, Number, Number, Number, Number, Number]
@@ -88,6 +89,29 @@ class Trajectory:
         """Make the arrays read-only."""
         self.knots_s.setflags(write=False)
         self.coefficients.setflags(write=False)
+
+    @classmethod
+    def through(cls, angles: npt.ArrayLike, times_s: npt.ArrayLike, name: str = "waypoints") -> Trajectory:
+        """The reference through waypoints in joint space with the least jerk, at rest at both ends.
+
+        Two waypoints are joined by the quintic ``10 s^3 - 15 s^4 + 6 s^5``; through inner ones it does not stop.
+
+        Args:
+            angles: waypoints, (K, n), rad (m for a joint that slides), K >= 2.
+            times_s: when, (K,), strictly increasing from 0.
+            name: of the reference.
+
+        Raises:
+            InputError: a number is not finite, times do not increase from 0, or their number is another one.
+        """
+        points, times = np.array(angles, dtype=np.float64), np.array(times_s, dtype=np.float64)
+        if points.ndim != 2 or len(points) < 2 or not points.shape[1] or not np.all(np.isfinite(points)):
+            raise InputError(name, "angles", f"shape {points.shape}", "two or more waypoints of finite coordinates")
+        if times.shape != (len(points),):
+            raise InputError(name, "times_s", f"shape {times.shape}", f"{len(points)} times, one per waypoint")
+        if times[0] != 0.0 or not np.all(np.isfinite(times)) or not np.all(np.diff(times) > 0.0):
+            raise InputError(name, "times_s", times.tolist(), "finite times that increase from 0")
+        return cls(name, times, quintic_hermite(times, least_jerk(times, points)))
 
     def __repr__(self) -> str:
         """Its size in a line."""

@@ -14,7 +14,8 @@ import numpy as np
 from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.trajectories.document import Trajectory
 from quasilpv.trajectories.paths import ArcSegment, LineSegment, Segment, SpiralSegment, TaskPath
-from quasilpv.trajectories.planning import Kinematics, plan
+from quasilpv.trajectories.planned import Kinematics
+from quasilpv.trajectories.planning import plan
 
 SQUARE = TaskPath(
     name="serial-square",
