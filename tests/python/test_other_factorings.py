@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
+import sympy as sp
 
 import quasilpv as ql
 from quasilpv.lmi.budget import Limits, time_left_s
 from quasilpv.studies.answer import Answer
 from quasilpv.studies.other_factorings import with_other_factorings
 from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.own_kind import fingerprint
+from quasilpv.systems.premise import PremiseKind
 from test_systems_factorings import tora
 
 
@@ -33,10 +36,35 @@ def test_tora_is_feasible_with_the_factoring_by_its_angle() -> None:
 
 
 def test_matrices_are_meant_as_they_are_given() -> None:
+    ql.solve(tora(), "guerra-2007", decay_rate=0.01)  # the same matrices, of equations, in the same program
     given = replace(tora(), from_formulas=False)
     answer = ql.solve(given, "guerra-2007", decay_rate=0.01)
     assert answer.headline == "infeasible, numerically"
     assert "factoring" not in answer.reason
+
+
+def test_questions_about_systems_that_differ_in_anything_are_different_questions() -> None:
+    """Systems are remembered by their digest: it covers every field, so that none is answered for another."""
+    one = tora()
+    symbol = one.state[0]
+    others = {
+        "name": "other",
+        "state": (sp.Symbol("y"), *one.state[1:]),
+        "inputs": ("torque",),
+        "premises": (replace(one.premises[0], kind=PremiseKind.UNKNOWN), *one.premises[1:]),
+        "E": replace(one.E, constant=2 * one.E.constant),
+        "A": replace(one.A, coefficients=2 * one.A.coefficients),
+        "B": replace(one.B, constant=2 * one.B.constant),
+        "C": replace(one.C, constant=2 * one.C.constant),
+        "domain": {**one.domain, symbol: (-7.0, 7.0)},
+        "disturbance": (0.0, 0.0, 0.0, 1e-3),
+        "given_by_rules": True,
+        "from_formulas": False,
+    }
+    assert others.keys() == {field.name for field in fields(one)}
+    assert fingerprint(one) == fingerprint(tora())
+    digests = {fingerprint(replace(one, **{name: value})) for name, value in others.items()}
+    assert len(digests | {fingerprint(one)}) == len(others) + 1
 
 
 def test_a_refutation_at_the_origin_concerns_every_factoring() -> None:

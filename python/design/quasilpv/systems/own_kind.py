@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from hashlib import sha256
 from itertools import count
 from typing import TypeAlias
 
+import numpy as np
 import sympy as sp
 
 from quasilpv.errors import InputError
@@ -63,17 +64,24 @@ def own_kind(system: SystemLike) -> SystemKind:
 
 
 def fingerprint(system: DescriptorSystem) -> str:
-    """A digest of everything a system consists of."""
-    matrices = (system.E, system.A, system.B, system.C)
-    parts = [
-        system.name,
-        *(sp.srepr(symbol) for symbol in system.state),
-        *system.inputs,
-        *(f"{p.name} {sp.srepr(p.expression)} {p.bounds} {p.kind.value}" for p in system.premises),
-        *(f"{symbol} {bounds}" for symbol, bounds in system.domain.items()),
-        *(array.tobytes().hex() for matrix in matrices for array in (matrix.constant, matrix.coefficients)),
-    ]
+    """A digest of everything a system consists of: of every field of its class, whatever fields it may gain."""
+    parts = [f"{field.name} {_text(getattr(system, field.name))}" for field in fields(system)]
     return sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _text(value: object) -> str:
+    """The same for equal values of the kinds a system is made of, and for no others."""
+    if isinstance(value, np.ndarray):
+        return f"{value.shape} {value.dtype} {value.tobytes().hex()}"
+    if isinstance(value, sp.Basic):
+        return str(sp.srepr(value))
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{_text(key)}: {_text(entry)}' for key, entry in value.items())}}}"
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_text, value))})"
+    if is_dataclass(value) and not isinstance(value, type):
+        return f"{type(value).__name__}({', '.join(_text(getattr(value, field.name)) for field in fields(value))})"
+    return repr(value)
 
 
 @dataclass(frozen=True)
