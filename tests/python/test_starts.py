@@ -61,8 +61,8 @@ class Row:
         if self.outcome is None:
             return LINE.format(self.scenario, self.controller, self.plant, self.kind, *"----") + f"  {self.why}"
         found = self.outcome
-        fast = int(np.argmax(found.speed_rad_s / found.allowed_speed_rad_s))
-        step = int(np.argmax(found.step_nm / found.allowed_step_nm))
+        fast = int(np.argmax(found.speed_rad_s - found.allowed_speed_rad_s))
+        step = int(np.argmax(found.step_nm - found.allowed_step_nm))
         numbers = (found.speed_rad_s[fast], found.allowed_speed_rad_s[fast], found.step_nm[step])
         cells = [f"{number:.4g}" for number in (*numbers, found.allowed_step_nm[step])]
         return LINE.format(self.scenario, self.controller, self.plant, self.kind, *cells)
@@ -121,6 +121,23 @@ def test_F11_the_whole_table_of_starts_is_within_its_bounds(tmp_path: Path, cach
                     beyond.append(str(found))
     (tmp_path / "start-table.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
     assert not beyond, "\n".join([lines[0], *beyond])
+
+
+@pytest.mark.parametrize(
+    ("speed", "allowed", "holds"),
+    [
+        ((0.0, 0.0), (0.0, 0.0), True),
+        ((0.0, 1.0), (0.0, 1.0), True),
+        ((1e-9, 0.0), (0.0, 1.0), False),
+        ((0.5, 1.1), (1.0, 1.0), False),
+    ],
+)
+def test_a_start_at_rest_is_within_a_bound_of_zero_and_nothing_else_is(
+    speed: tuple[float, ...], allowed: tuple[float, ...], holds: bool
+) -> None:
+    of_speed = StartOutcome(np.array(speed), np.array(allowed), np.zeros(2), np.ones(2))
+    of_torque = StartOutcome(np.zeros(2), np.ones(2), np.array(speed), np.array(allowed))
+    assert of_speed.holds is of_torque.holds is holds
 
 
 def test_the_speed_of_joining_is_that_of_the_quintic_whatever_the_start(cache: Path) -> None:

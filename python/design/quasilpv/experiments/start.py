@@ -58,12 +58,12 @@ class StartOutcome:
     @property
     def speed_ratio(self) -> float:
         """Of the joint that comes nearest to what it may."""
-        return float(np.max(self.speed_rad_s / self.allowed_speed_rad_s))
+        return _largest_share(self.speed_rad_s, self.allowed_speed_rad_s)
 
     @property
     def step_ratio(self) -> float:
         """Likewise."""
-        return float(np.max(self.step_nm / self.allowed_step_nm))
+        return _largest_share(self.step_nm, self.allowed_step_nm)
 
     @property
     def holds(self) -> bool:
@@ -168,6 +168,12 @@ def start(artifact: Artifact, trajectory: Trajectory, scenario: Scenario, kind: 
         step_nm=np.abs(first - in_force),
         allowed_step_nm=np.abs(own - in_force) + TORQUE_SHARE * np.array(artifact.limits.torque_nm),
     )
+
+
+def _largest_share(found: FloatArray, allowed: FloatArray) -> float:
+    """Of what is allowed, over the joints; where nothing is, nothing is all of it and anything too much."""
+    without = np.where(found > 0.0, np.inf, 0.0)
+    return float(np.max(np.divide(found, allowed, out=without, where=allowed > 0.0)))
 
 
 def joining_speed(artifact: Artifact, offset: FloatArray, speed: FloatArray) -> FloatArray:
