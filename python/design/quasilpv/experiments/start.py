@@ -130,13 +130,14 @@ def start(artifact: Artifact, trajectory: Trajectory, scenario: Scenario, kind: 
     Args:
         artifact: the controller.
         trajectory: the reference.
-        scenario: the plant and how it begins; `Start.BESIDE` moves it. Its disturbances are those of both runs.
+        scenario: the plant and how it begins; `Start.BESIDE` moves it. Its disturbances are those of both runs. The
+            undisturbed one begins half an encoder step from there.
         kind: of start. A restart or a fault interrupts the run when the undisturbed one is fastest.
 
     Raises:
         ClaimError: the controller does not start.
     """
-    undisturbed = _Run.of(artifact, trajectory, scenario)
+    undisturbed = _Run.of(artifact, trajectory, _at_an_edge(scenario))
     samples = undisturbed.session.samples
     speeds = undisturbed.follow(undisturbed.loop(bumpless=False), samples)
     usual = speeds.max(axis=0)
@@ -226,6 +227,19 @@ def _beside(artifact: Artifact, scenario: Scenario) -> FloatArray:
     upwards = high - angle >= angle - low
     room = 0.999 * np.where(upwards, high - angle, angle - low)
     return np.asarray(np.where(upwards, 1.0, -1.0) * np.minimum(BESIDE_RAD, room))
+
+
+def _at_an_edge(scenario: Scenario) -> Scenario:
+    """The same begun half an encoder step aside, where every encoder has just changed its reading.
+
+    An arm at rest on a mark of its encoders is not seen to move and never moves. After every other start the law
+    answers to the steps of its encoders, as in the undisturbed run of every arm that is somewhere between.
+    """
+    bits = scenario.sensors.encoder_bits
+    if bits == 0:
+        return scenario
+    angle = tuple(a + 0.501 * 2.0 * np.pi / 2**bits for a in scenario.initial.angle_rad)
+    return scenario.model_copy(update={"initial": scenario.initial.model_copy(update={"angle_rad": angle})})
 
 
 def _offset(run: _Run) -> tuple[FloatArray, FloatArray]:
