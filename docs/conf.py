@@ -16,7 +16,7 @@ DOXYGEN_OUTPUT = ROOT / "build/docs/doxygen"
 sys.path.append(str(DOCS / "_extensions"))
 
 project = "quasilpv"
-author = "the quasilpv authors"
+author = "quasilpv developers"
 project_copyright = author
 version = release = quasilpv.__version__
 
