@@ -32,9 +32,9 @@ from quasilpv.figures.gallery import write_gallery
 from quasilpv.release import checked_artifact
 from quasilpv.scenarios import Sensors, sine_torques
 from quasilpv.synthesis import synthesise, without_compensation
-from quasilpv.systems.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
-from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.registry import Robot
+from quasilpv.systems.robots.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
+from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.registry import Robot
 from quasilpv.trajectories import TaskPath, plan
 from quasilpv.trajectories.paths import ArcSegment, LineSegment, Segment
 

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.structure import structure_report
+from quasilpv.systems.descriptor.structure import structure_report
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 
 def dc_bus(deviation_max_v: float = 12.0, power_w: tuple[float, float] = (200.0, 600.0)) -> DescriptorSystem:

@@ -18,7 +18,7 @@ from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.lmi.feasibility import Decision, decide
 from quasilpv.polytopes import polytopic_model
 from quasilpv.systems.catalogue import system
-from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 FloatArray = npt.NDArray[np.float64]
 

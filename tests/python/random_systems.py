@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 
 def random_system(

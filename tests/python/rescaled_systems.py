@@ -9,8 +9,8 @@ import numpy.typing as npt
 import sympy as sp
 
 from quasilpv.conditions.condition import Options
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix
+from quasilpv.systems.descriptor.premise import AffineMatrix
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 FloatArray = npt.NDArray[np.float64]
 

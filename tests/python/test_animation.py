@@ -16,8 +16,8 @@ from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.animation import FRAMES_PER_SECOND, LAST_FRAME_S, Film, write_animation
-from quasilpv.systems.mechanism import PlanarMechanism
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.mechanism import PlanarMechanism
+from quasilpv.systems.robots.registry import robot
 from reference.readable import assert_readable
 from reference.runs import synthetic_result
 

@@ -97,6 +97,21 @@ def upward_imports(module: str, imports: set[str]) -> set[str]:
     return {name for name, room in rooms.items() if room != own and RANK[room] >= RANK[own]}
 
 
+# Rooms whose folders a reader takes in at a glance.
+FEW_FILES = (
+    PACKAGE / "conditions",
+    PACKAGE / "synthesis",
+    PACKAGE / "systems",
+)
+
+
+@pytest.mark.parametrize("room", FEW_FILES, ids=lambda room: str(room.relative_to(ROOT)))
+def test_no_folder_has_more_files_than_a_reader_takes_in_at_a_glance(room: Path) -> None:
+    folders = [room, *(path for path in room.rglob("*") if path.is_dir() and path.name != "__pycache__")]
+    counts = {folder: sum(path.is_file() for path in folder.iterdir()) for folder in folders}
+    assert {str(folder): count for folder, count in counts.items() if count > 20} == {}
+
+
 def test_every_room_has_a_place_in_the_order() -> None:
     assert SOURCES
     assert {room_of(module) for module in SOURCES} <= set(RANK)

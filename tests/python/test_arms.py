@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from quasilpv.errors import InputError
-from quasilpv.systems.arm_parameters import Link, OperatingDomain, PayloadSet
-from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.arm_parameters import Link, OperatingDomain, PayloadSet
+from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.registry import robot
 
 ARM2, ARM3 = robot("arm2").model, robot("arm3").model
 NAMED = [ARM2, ARM3, replace(ARM2, equilibrium="upright"), replace(ARM3, coriolis_factorisation="christoffel")]

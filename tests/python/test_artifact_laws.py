@@ -14,7 +14,7 @@ from quasilpv.artifact import Artifact, evaluate
 from quasilpv.artifact.canonical import canonical_cbor, parse_document
 from quasilpv.artifact.tables import PolytopeTable
 from quasilpv.errors import InputError
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from reference.artifacts import SCHEDULE_GAINS, Change, arm3_document, at, refusal, schedule_table, without
 
 DELAYED = ("law", "lyapunov", "blocks", 1, "vertices", 0)

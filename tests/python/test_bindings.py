@@ -17,7 +17,7 @@ from quasilpv import _runtime
 from quasilpv.artifact.canonical import canonical_cbor, canonical_json, parse_document, with_hash
 from quasilpv.errors import InputError, PlantError
 from quasilpv.scenarios import build_scenario
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from quasilpv.trajectories import serial_circle
 from reference.random_arms import artifact_bytes, random_arm
 

@@ -26,8 +26,8 @@ from quasilpv.polytopes import polytopic_model
 from quasilpv.studies import affordable
 from quasilpv.studies.front_door import question
 from quasilpv.systems.catalogue import system
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.equations import rate
+from quasilpv.systems.descriptor.equations import rate
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 ROOT = Path(__file__).parents[2]
 

@@ -20,8 +20,8 @@ from quasilpv.chain import ArtifactLike, Design, Simulation
 from quasilpv.experiments.track import TrackingExperiment
 from quasilpv.scenarios import read_scenario, sine_torques
 from quasilpv.synthesis import CONTROLLERS
-from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.registry import robots
+from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.registry import robots
 from quasilpv.trajectories import TaskPath, plan, rest, write_trajectory
 from quasilpv.trajectories.paths import LineSegment, Segment
 

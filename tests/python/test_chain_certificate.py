@@ -14,7 +14,7 @@ from quasilpv.certificate.chain import ChainForm, ChainJoint, ChainProof, bernst
 from quasilpv.certificate.exact_matrices import matrix, rational
 from quasilpv.certificate.gate_rationals import to_floats
 from quasilpv.synthesis.chain_storages import InertiaPairing, Side, Storages, find_storages
-from quasilpv.systems.tree import JointKind, KinematicTree
+from quasilpv.systems.robots.tree import JointKind, KinematicTree
 from reference.random_trees import coordinates, random_body, random_tree
 
 seeds = st.integers(0, 2**32 - 1)

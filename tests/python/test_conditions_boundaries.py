@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 
 from closed_loops import decided, stated
 from quasilpv.conditions.condition import Form, Options
+from quasilpv.conditions.forms.slack import Slack
 from quasilpv.conditions.registry import condition
-from quasilpv.conditions.slack import Slack
 from quasilpv.lmi import Outcome
 from quasilpv.polytopes import polytopic_model
 from random_systems import random_system

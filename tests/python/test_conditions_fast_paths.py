@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from closed_loops import decided, worst_rate
-from quasilpv.conditions import i2
 from quasilpv.conditions.condition import Form, Options
+from quasilpv.conditions.forms.slack import Slack
 from quasilpv.conditions.registry import condition
-from quasilpv.conditions.slack import Slack
+from quasilpv.conditions.theorems import i2
 from quasilpv.lmi import Outcome
 from quasilpv.polytopes import PolytopicModel, polytopic_model
-from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from random_systems import random_system
 
 DECIDED = {Outcome.VERIFIED, Outcome.INFEASIBLE_NUMERICALLY}

@@ -10,16 +10,16 @@ import sympy as sp
 
 from closed_loops import decided, premises, reduced_loop, stated, worst_rate, worst_root
 from quasilpv.conditions.condition import Feedback, Form, Options
-from quasilpv.conditions.extended import extended_inputs, extended_lyapunov, extended_states, on_differential
+from quasilpv.conditions.forms.extended import extended_inputs, extended_lyapunov, extended_states, on_differential
+from quasilpv.conditions.forms.slack import Slack
 from quasilpv.conditions.gains import on_state
 from quasilpv.conditions.registry import CONDITIONS, condition
-from quasilpv.conditions.slack import Slack
 from quasilpv.errors import InputError
 from quasilpv.lmi import Expression, Problem, Variable, block
 from quasilpv.polytopes import BlockPolytope, PolytopicModel, polytopic_model
 from quasilpv.systems.catalogue import system
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix, Premise
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from random_systems import random_system
 
 Parameters = dict[str, float]

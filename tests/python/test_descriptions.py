@@ -14,7 +14,7 @@ from quasilpv.descriptions.inertia_range import proved_inertia_range
 from quasilpv.descriptions.plausibility import concerns, require_bodies
 from quasilpv.descriptions.robot_file import read_description, read_robot_file
 from quasilpv.errors import InputError
-from quasilpv.systems.tree import JointKind
+from quasilpv.systems.robots.tree import JointKind
 
 DATA = Path(__file__).parents[1] / "data" / "robots"
 URDF, MJCF, TOML = DATA / "two_links.urdf", DATA / "two_links.xml", DATA / "two_links.toml"

@@ -21,7 +21,7 @@ from quasilpv.errors import InputError
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import to_artifact
 from quasilpv.synthesis import Specification, synthesise
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from reference.gated_arms import arm4, artifact_document, multiple_pole_loop
 
 Document = dict[str, Any]

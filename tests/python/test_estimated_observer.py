@@ -7,18 +7,18 @@ from itertools import product
 import numpy as np
 import pytest
 
-from quasilpv.conditions import estimated_observer
 from quasilpv.conditions.condition import Feedback, Options
-from quasilpv.conditions.mismatch import inner_bounded, lipschitz, with_one_sided
+from quasilpv.conditions.forms.mismatch import inner_bounded, lipschitz, with_one_sided
 from quasilpv.conditions.registry import condition
+from quasilpv.conditions.theorems import estimated_observer
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.lmi.feasibility import decide
 from quasilpv.polytopes import PolytopicModel, polytopic_model
-from quasilpv.studies.velocity_classes import VelocityClasses
-from quasilpv.synthesis.speed_observer import SpeedObserver, speed_observer
+from quasilpv.reproduction.observers.speed_observer import SpeedObserver, speed_observer
+from quasilpv.reproduction.observers.velocity_classes import VelocityClasses
 from quasilpv.systems.catalogue import system
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from reference.mutants import Mutant
 
 OPTIONS = Options(decay_rate=5.0, sample_period_s=1e-3)

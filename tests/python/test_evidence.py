@@ -28,7 +28,7 @@ from quasilpv.errors import ClaimError, InfeasibleError, InputError
 from quasilpv.release import checked_artifact, to_artifact
 from quasilpv.synthesis import CONTROLLERS, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import robot, robots
+from quasilpv.systems.robots.registry import robot, robots
 
 QUICK = [("arm2", "dob-acceleration"), ("arm2", "pdc"), ("arm2", "delayed"), ("spring-disc", "robust")]
 EVERY = [(entry.id, controller) for entry in robots() for controller in CONTROLLERS]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import quasilpv as ql
-from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 
 def _system(

@@ -11,7 +11,7 @@ from quasilpv.conditions.condition import Feedback
 from quasilpv.errors import InputError
 from quasilpv.experiments.extended_feedback import extended_feedback, simulate_extended
 from quasilpv.systems.catalogue import system
-from quasilpv.systems.registry import arm2
+from quasilpv.systems.robots.registry import arm2
 
 DECAY = 1.0
 START = [np.pi / 8.0, 0.0, 0.0, 0.0]

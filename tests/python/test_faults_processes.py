@@ -20,7 +20,7 @@ from quasilpv.artifact import write_artifact
 from quasilpv.release import release
 from quasilpv.scenarios import SineTorque, build_scenario, write_scenario
 from quasilpv.synthesis import Specification
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from quasilpv.trajectories import rest
 from quasilpv.trajectories.document import write_trajectory
 from two_processes import SAMPLES, Experiment, finish, wait_for_commands, without_privileges

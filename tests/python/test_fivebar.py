@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from quasilpv.errors import InputError
-from quasilpv.systems.arm_parameters import Link
-from quasilpv.systems.fivebar import RhombicFiveBar
-from quasilpv.systems.fivebar_linkage import FiveBarLinkage
-from quasilpv.systems.registry import fivebar, robot
+from quasilpv.systems.robots.arm_parameters import Link
+from quasilpv.systems.robots.fivebar import RhombicFiveBar
+from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
+from quasilpv.systems.robots.registry import fivebar, robot
 
 Array = NDArray[np.float64]
 

@@ -28,8 +28,8 @@ from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.torque_law import TorqueLaw
 from quasilpv.release import release
 from quasilpv.synthesis import Specification
-from quasilpv.systems.fivebar import RhombicFiveBar
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.fivebar import RhombicFiveBar
+from quasilpv.systems.robots.registry import robot
 from reference.five_bar_run import sines, track
 from reference.gated_arms import artifact_document, full_map, multiple_pole_loop
 

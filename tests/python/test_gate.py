@@ -24,8 +24,8 @@ from quasilpv.certificate.gate_margin import InertiaMargin, inertia_margin
 from quasilpv.certificate.gate_polynomials import CircleProduct, critical_values, is_schur, roots_between
 from quasilpv.certificate.gate_rationals import float_at_least, float_at_most, to_float
 from quasilpv.errors import InputError
-from quasilpv.synthesis.sampled_loop import AccelerationLaw, SampledLoop
-from quasilpv.systems.registry import robot
+from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw, SampledLoop
+from quasilpv.systems.robots.registry import robot
 from reference.gated_arms import full_map, growth_rate, multiple_pole_loop
 
 DEFAULT = multiple_pole_loop(60, 1200, 1e-3, 1e-3)

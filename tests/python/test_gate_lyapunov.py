@@ -24,11 +24,11 @@ from quasilpv.certificate.gate_motion import InertiaDisc
 from quasilpv.certificate.gate_rationals import to_floats
 from quasilpv.errors import ClaimError, InputError
 from quasilpv.release import checked_artifact, to_artifact
-from quasilpv.synthesis import moving_inertia as design
 from quasilpv.synthesis import synthesise
-from quasilpv.synthesis.moving_lyapunov import delayed_loop, known_signals, moving_lyapunov
-from quasilpv.synthesis.sampled_loop import AccelerationLaw
-from quasilpv.systems.registry import robot
+from quasilpv.synthesis.acceleration import moving_inertia as design
+from quasilpv.synthesis.acceleration.moving_lyapunov import delayed_loop, known_signals, moving_lyapunov
+from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw
+from quasilpv.systems.robots.registry import robot
 from reference.gated_arms import full_map, moving_design, moving_five_bar, multiple_pole_loop, quotients
 
 FloatArray = npt.NDArray[np.float64]

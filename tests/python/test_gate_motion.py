@@ -23,8 +23,8 @@ from quasilpv.certificate.gate_rationals import to_float
 from quasilpv.errors import InputError
 from quasilpv.release import to_artifact
 from quasilpv.synthesis import Specification, synthesise
-from quasilpv.synthesis.moving_inertia import needed_disc
-from quasilpv.systems.registry import robot
+from quasilpv.synthesis.acceleration.moving_inertia import needed_disc
+from quasilpv.systems.robots.registry import robot
 from reference.gated_arms import artifact_document, full_map, moving_five_bar, multiple_pole_loop, quotients
 
 LOOP = multiple_pole_loop(60, 1200, 1e-3, 1e-3)

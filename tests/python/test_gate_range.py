@@ -30,7 +30,7 @@ from quasilpv.cli import run
 from quasilpv.errors import InputError
 from quasilpv.figures.margins import margin_figure
 from quasilpv.polytopes import BlockPolytope
-from quasilpv.systems.registry import Robot, robot
+from quasilpv.systems.robots.registry import Robot, robot
 from reference.gated_arms import arm4, artifact_document, growth_rate, multiple_pole_loop
 
 LINK = LinkData(length_m=1.0, mass_kg=1.0, com_m=0.5, inertia_kg_m2=0.5)

@@ -25,7 +25,7 @@ from quasilpv.figures.growth import growth_figure
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
 from quasilpv.synthesis import Specification
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from reference.step import DobTorque, OutputStage, Sample
 
 FloatArray = npt.NDArray[np.float64]

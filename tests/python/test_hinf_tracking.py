@@ -18,17 +18,17 @@ from quasilpv.artifact.canonical import canonical_json, with_hash
 from quasilpv.certificate import CHECKERS, gate, verify
 from quasilpv.certificate.grid_gate import frozen_hinf_law
 from quasilpv.certificate.hinf_law import unknown_terms
-from quasilpv.conditions.iii10 import tracking_condition
-from quasilpv.conditions.iii10_reduced import UnknownTorques, reduced_tracking_condition
+from quasilpv.conditions.tracking.iii10 import tracking_condition
+from quasilpv.conditions.tracking.iii10_reduced import UnknownTorques, reduced_tracking_condition
 from quasilpv.errors import InfeasibleError
 from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
 from quasilpv.scenarios import Sensors
 from quasilpv.synthesis import Specification
-from quasilpv.synthesis.hinf_tracking import hinf_tracking, unknown_torques
-from quasilpv.synthesis.torque_schedule import full_schedule
-from quasilpv.systems.registry import robot
+from quasilpv.synthesis.hinf import hinf_tracking, unknown_torques
+from quasilpv.synthesis.torque.schedule import full_schedule
+from quasilpv.systems.robots.registry import robot
 from reference.mutants import BLOCKS, Mutant
 
 FloatArray = npt.NDArray[np.float64]
@@ -36,7 +36,7 @@ Document = dict[str, Any]
 
 RATE_HZ = 4000.0
 POINTS = 2000
-CONDITION = "quasilpv.conditions.iii10_reduced"
+CONDITION = "quasilpv.conditions.tracking.iii10_reduced"
 
 
 @cache

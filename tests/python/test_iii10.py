@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from quasilpv.conditions.iii10 import TrackingCondition, tracking_condition
+from quasilpv.conditions.tracking.iii10 import TrackingCondition, tracking_condition
 from quasilpv.lmi import Solution
 from quasilpv.polytopes import BlockPolytope
 

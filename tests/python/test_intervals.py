@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from quasilpv.errors import InputError
-from quasilpv.systems.intervals import IntervalFunction, _lower, _upper, enclose
-from quasilpv.systems.quotients import expm1_quotient, tanh_quotient
+from quasilpv.systems.intervals.enclosure import IntervalFunction, _lower, _upper, enclose
+from quasilpv.systems.intervals.quotients import expm1_quotient, tanh_quotient
 
 x, y, w = sp.symbols("x y w", real=True)
 

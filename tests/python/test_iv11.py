@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from quasilpv.conditions.iv11_literal import literal_feedback, literal_observer
-from quasilpv.conditions.iv11_reduced import (
+from quasilpv.conditions.tracking.iv11_literal import literal_feedback, literal_observer
+from quasilpv.conditions.tracking.iv11_reduced import (
     FeedbackPoint,
     ObserverPoint,
     feedback_condition,

@@ -24,8 +24,8 @@ from quasilpv.errors import InputError
 from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.lmi.feasibility import decide
 from quasilpv.polytopes import polytopic_model
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 FloatArray = npt.NDArray[np.float64]
 

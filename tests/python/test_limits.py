@@ -25,7 +25,7 @@ from quasilpv.scenarios import EXTERNAL_TORQUE, Sensors, build_scenario, motions
 from quasilpv.synthesis import synthesise
 from quasilpv.synthesis.actuator_demand import Motion, largest_gravity, predicted_increments, unmet_demands
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import robot, robots
+from quasilpv.systems.robots.registry import robot, robots
 from quasilpv.trajectories import rest
 from reference.runs import synthetic_result, synthetic_run, tool_position
 

@@ -27,7 +27,7 @@ from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.release import release
 from quasilpv.scenarios import EXTERNAL_TORQUE, Sensors, build_scenario
 from quasilpv.synthesis import Specification
-from quasilpv.systems.registry import robot, robots
+from quasilpv.systems.robots.registry import robot, robots
 from quasilpv.telemetry import LOG_NAME, Event, RunLog, latest_log, read_events, read_log, write_events
 from quasilpv.telemetry.codes import event_in_words
 from quasilpv.telemetry.log import point_to

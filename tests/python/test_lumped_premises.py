@@ -8,12 +8,12 @@ import pytest
 from quasilpv.loops.loop_grid import configurations
 from quasilpv.release import checked_artifact
 from quasilpv.synthesis import Specification, synthesise
-from quasilpv.synthesis.inertia_range import needed_inertia_range
+from quasilpv.synthesis.acceleration.inertia_range import needed_inertia_range
+from quasilpv.synthesis.acceleration.lumped_premises import lumped_acceleration_law, with_premises_lumped
 from quasilpv.synthesis.inertia_schedule import schedule_of
-from quasilpv.synthesis.lumped_premises import lumped_acceleration_law, with_premises_lumped
-from quasilpv.synthesis.torque_design import TorqueBandwidth, holds_exactly, torque_design_at
+from quasilpv.synthesis.torque.design import TorqueBandwidth, holds_exactly, torque_design_at
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 
 ARM = robot("arm3")
 PARTITIONS = [(0, 1, 2), (1, 2), (2,), ()]

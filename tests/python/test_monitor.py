@@ -11,7 +11,7 @@ from quasilpv.artifact import Artifact
 from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
 from quasilpv.release import release
 from quasilpv.scenarios import Sensors, SineTorque
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from quasilpv.telemetry import LOG_NAME, read_log
 from quasilpv.telemetry.message_types import Records
 from quasilpv.trajectories import Trajectory, rest

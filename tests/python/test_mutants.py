@@ -27,8 +27,8 @@ from reference.shipped_laws import (
     torque_document,
 )
 
-CHAINS = "quasilpv.conditions.sampled_chains"
-REDUCED = "quasilpv.conditions.iv11_reduced"
+CHAINS = "quasilpv.conditions.tracking.sampled_chains"
+REDUCED = "quasilpv.conditions.tracking.iv11_reduced"
 BACK_OFF = 0.02
 
 

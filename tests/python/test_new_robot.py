@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose
 from quasilpv.artifact import read_artifact
 from quasilpv.certificate import verify
 from quasilpv.errors import InputError
-from quasilpv.systems.arm_parameters import OperatingDomain
+from quasilpv.systems.robots.arm_parameters import OperatingDomain
 from quasilpv.trajectories import plan
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "four_link_arm.py"

@@ -15,7 +15,7 @@ from quasilpv.artifact import Artifact
 from quasilpv.artifact.canonical import canonical_json, parse_strict_json, with_hash
 from quasilpv.errors import InputError
 from quasilpv.scenarios import Rk4Integrator, Scenario, SineTorque, build_scenario
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from quasilpv.trajectories import Trajectory, rest, serial_square
 from reference.artifacts import LAWS, arm3_document
 from test_scenarios import five_bar_document, spring_disc_document

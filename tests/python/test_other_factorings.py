@@ -12,9 +12,9 @@ import quasilpv as ql
 from quasilpv.lmi.budget import Limits, time_left_s
 from quasilpv.studies.answer import Answer
 from quasilpv.studies.other_factorings import with_other_factorings
-from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.descriptor.premise import PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.own_kind import fingerprint
-from quasilpv.systems.premise import PremiseKind
 from test_systems_factorings import tora
 
 

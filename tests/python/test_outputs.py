@@ -27,7 +27,7 @@ from quasilpv.files import claim_file, claim_folder, one_command
 from quasilpv.release import release
 from quasilpv.scenarios import Sensors
 from quasilpv.synthesis import Specification
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from quasilpv.telemetry import LOG_NAME
 from quasilpv.trajectories import rest
 

@@ -9,10 +9,10 @@ import pytest
 from scipy.interpolate import BPoly
 
 from quasilpv.errors import InputError
-from quasilpv.systems.arm_parameters import Link, OperatingDomain
-from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.spatial import Placement, SpatialInertia
-from quasilpv.systems.tree import JointKind, KinematicTree, TreeJoint
+from quasilpv.systems.robots.arm_parameters import Link, OperatingDomain
+from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.spatial import Placement, SpatialInertia
+from quasilpv.systems.robots.tree import JointKind, KinematicTree, TreeJoint
 from quasilpv.trajectories import SpatialPath, TaskPath, Trajectory, plan, plan_in_space, read_spatial_path
 from quasilpv.trajectories.inverse import rotation_vector
 from quasilpv.trajectories.paths import LineSegment, Segment

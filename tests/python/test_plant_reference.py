@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from quasilpv import _runtime
-from quasilpv.systems.arms import PlanarSerialArm
+from quasilpv.systems.robots.arms import PlanarSerialArm
 from reference.random_arms import random_arm
 from reference.serial_arm import SerialArm, Sine
 

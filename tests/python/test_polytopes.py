@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from quasilpv.errors import InputError
 from quasilpv.polytopes import Block, BlockPolytope, MultilinearForm
-from quasilpv.systems.registry import Robot, robot, robots
+from quasilpv.systems.robots.registry import Robot, robot, robots
 
 Array = NDArray[np.float64]
 

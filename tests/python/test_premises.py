@@ -6,9 +6,9 @@ import sympy as sp
 from numpy.testing import assert_allclose, assert_array_equal
 
 from quasilpv.errors import InputError
-from quasilpv.systems.arm_parameters import OperatingDomain
-from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
-from quasilpv.systems.registry import Robot, robots
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.robots.arm_parameters import OperatingDomain
+from quasilpv.systems.robots.registry import Robot, robots
 
 # The design box of the default trajectories was printed with speeds rounded to three decimals.
 PRINTED_ARM3_BOX = {

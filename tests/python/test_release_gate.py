@@ -19,7 +19,7 @@ from quasilpv.experiments import designs
 from quasilpv.release import checked_artifact, release
 from quasilpv.synthesis import Specification, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from test_architecture import loaded_with, room_of
 
 

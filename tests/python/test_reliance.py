@@ -12,8 +12,8 @@ from quasilpv.conditions.reliance import Reliance, Status
 from quasilpv.errors import InputError
 from quasilpv.polytopes import polytopic_model
 from quasilpv.systems.catalogue import SYSTEMS, system
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.equations import rate
+from quasilpv.systems.descriptor.equations import rate
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from random_systems import random_system
 
 x, v, u, m, lam = (sp.Symbol(name, real=True) for name in ("x", "v", "u", "m", "lam"))

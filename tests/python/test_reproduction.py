@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quasilpv.cli import run
-from quasilpv.conditions.cube import cube_sum
+from quasilpv.conditions.forms.cube import cube_sum
 from quasilpv.errors import InputError
 from quasilpv.lmi import Problem, Variable
 from quasilpv.lmi.compiled import CompiledProblem

@@ -34,7 +34,7 @@ from quasilpv.reproduction.constraints import closure_along, rolling_along
 from quasilpv.reproduction.tracking_claims import RATE_HZ, Printed
 from quasilpv.reproduction.tracking_comparison import Comparison, Sampled
 from quasilpv.synthesis import Specification, synthesise
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from reference.readable import assert_readable
 from reference.runs import synthetic_result
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_lyapunov
 
-from quasilpv.conditions.sampled_chains import (
+from quasilpv.conditions.tracking.sampled_chains import (
     FEEDBACK_DISK,
     OBSERVER_DISK,
     disk_of,

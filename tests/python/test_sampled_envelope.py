@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 from quasilpv.certificate import verify
 from quasilpv.certificate.gate_data import loop_data
 from quasilpv.certificate.sampled_envelope import ErrorDynamics
-from quasilpv.conditions.sampled_errors import SampledErrors, sampled_errors
+from quasilpv.conditions.tracking.sampled_errors import SampledErrors, sampled_errors
 from quasilpv.errors import InputError
 from quasilpv.release import release
-from quasilpv.synthesis.operating_envelope import acceleration_envelope
-from quasilpv.systems.registry import robot
+from quasilpv.synthesis.acceleration.envelope import acceleration_envelope
+from quasilpv.systems.robots.registry import robot
 
 FloatArray = npt.NDArray[np.float64]
 Document = dict[str, Any]

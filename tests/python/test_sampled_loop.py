@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from quasilpv.synthesis.inertia_range import needed_inertia_range
-from quasilpv.synthesis.sampled_loop import AccelerationLaw, SampledLoop
-from quasilpv.systems.registry import robot
+from quasilpv.synthesis.acceleration.inertia_range import needed_inertia_range
+from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw, SampledLoop
+from quasilpv.systems.robots.registry import robot
 
 
 def multiple_pole_law(wc: float, wo: float, filter_s: float, T: float) -> AccelerationLaw:

@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 from quasilpv.artifact.canonical import canonical_json
 from quasilpv.cli import run
-from quasilpv.conditions.iv11_reduced import feedback_condition, observer_condition
-from quasilpv.conditions.sampled_chains import feedback_gains, observer_gains
+from quasilpv.conditions.tracking.iv11_reduced import feedback_condition, observer_condition
+from quasilpv.conditions.tracking.sampled_chains import feedback_gains, observer_gains
 from quasilpv.errors import InputError
 from quasilpv.lmi import Problem, SdpaProgram, Solution, Variable, block, he
 from quasilpv.lmi.assembly import unpack

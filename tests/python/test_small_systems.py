@@ -10,14 +10,14 @@ import sympy as sp
 
 from closed_loops import decided, worst_rate
 from quasilpv.conditions.condition import Form, Options
+from quasilpv.conditions.forms.slack import Slack
 from quasilpv.conditions.registry import CONDITIONS
-from quasilpv.conditions.slack import Slack
 from quasilpv.errors import InputError
 from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.polytopes import polytopic_model
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.equations import rate
-from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.descriptor.equations import rate
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 REPRESENTATIONS = ("ts", "reduced", "per-premise", "per-premise@0", "uncertain", "grouped=0")
 OPTIONS = (

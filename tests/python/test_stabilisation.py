@@ -26,10 +26,10 @@ from quasilpv.release import to_artifact
 from quasilpv.scenarios import Sensors, build_scenario
 from quasilpv.synthesis.progress import no_progress
 from quasilpv.synthesis.specification import Specification
-from quasilpv.synthesis.stabilisation import DECAY_PER_S, stabilisation
+from quasilpv.synthesis.stabilising.laws import DECAY_PER_S, stabilisation
 from quasilpv.systems.catalogue import system
-from quasilpv.systems.registry import robot, spring_disc
-from quasilpv.systems.rolling_disc import RollingDisc
+from quasilpv.systems.robots.registry import robot, spring_disc
+from quasilpv.systems.robots.rolling_disc import RollingDisc
 from quasilpv.trajectories import Trajectory
 
 FloatArray = npt.NDArray[np.float64]

@@ -16,7 +16,7 @@ from quasilpv.experiments import designs
 from quasilpv.experiments.start import Start, StartOutcome, joining_speed, start
 from quasilpv.scenarios import build_scenario, tracking_task
 from quasilpv.synthesis import CONTROLLERS, Specification
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 
 TRACKING = tuple(name for name in CONTROLLERS if name not in ("pdc", "descriptor", "robust", "delayed"))
 TABLE = (

@@ -13,7 +13,7 @@ from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.release import release
 from quasilpv.scenarios import Sensors
 from quasilpv.synthesis import Specification
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from quasilpv.telemetry import LOG_NAME
 from quasilpv.trajectories import rest
 

@@ -9,9 +9,9 @@ from quasilpv.artifact import evaluate
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.release import Release, release
 from quasilpv.synthesis import Specification
-from quasilpv.synthesis.inertia_range import needed_inertia_range
-from quasilpv.synthesis.sampled_loop import AccelerationLaw, SampledLoop
-from quasilpv.systems.registry import robot
+from quasilpv.synthesis.acceleration.inertia_range import needed_inertia_range
+from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw, SampledLoop
+from quasilpv.systems.robots.registry import robot
 
 
 @cache

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from quasilpv.errors import InputError
-from quasilpv.systems.arm_parameters import OperatingDomain
-from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import Premise
-from quasilpv.systems.registry import robot, robots
+from quasilpv.systems.descriptor.premise import Premise
+from quasilpv.systems.descriptor.system import DescriptorSystem
+from quasilpv.systems.robots.arm_parameters import OperatingDomain
+from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.registry import robot, robots
 
 x1, x2 = sp.symbols("x1 x2", real=True)
 DOMAIN = {x1: (-1.0, 2.0), x2: (0.5, 3.0)}

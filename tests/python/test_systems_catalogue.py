@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from quasilpv.errors import InputError
-from quasilpv.systems.arm_parameters import OperatingDomain
 from quasilpv.systems.catalogue import SYSTEMS, system
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.intervals import enclose
-from quasilpv.systems.premise import PremiseKind
-from quasilpv.systems.registry import robot
+from quasilpv.systems.descriptor.premise import PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
+from quasilpv.systems.intervals.enclosure import enclose
+from quasilpv.systems.robots.arm_parameters import OperatingDomain
+from quasilpv.systems.robots.registry import robot
 
 numbers = st.floats(-30, 30, allow_nan=False)
 DIFFERENTIAL = {

@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from quasilpv.errors import InputError
 from quasilpv.systems.catalogue import system
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.equations import rate
-from quasilpv.systems.factoring import factored
-from quasilpv.systems.premise import PremiseKind
-from quasilpv.systems.quotients import expm1_quotient, tanh_quotient
-from quasilpv.systems.registry import robots
+from quasilpv.systems.descriptor.equations import rate
+from quasilpv.systems.descriptor.factoring import factored
+from quasilpv.systems.descriptor.premise import PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
+from quasilpv.systems.intervals.quotients import expm1_quotient, tanh_quotient
+from quasilpv.systems.robots.registry import robots
 
 x1, x2, x3, u, force, delta = sp.symbols("x1 x2 x3 u lambda delta", real=True)
 z3 = sp.Symbol("z3", real=True)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import PremiseKind
-from quasilpv.systems.structure import Standing, StructureVerdict, structure_report
+from quasilpv.systems.descriptor.premise import PremiseKind
+from quasilpv.systems.descriptor.structure import Standing, StructureVerdict, structure_report
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "own_system.py"
 NAMES = runpy.run_path(str(EXAMPLE))

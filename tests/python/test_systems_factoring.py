@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quasilpv.errors import InputError
-from quasilpv.systems.chords import CHORDS, Ramp
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.factoring import factored, split
-from quasilpv.systems.intervals import enclose
+from quasilpv.systems.descriptor.factoring import factored, split
+from quasilpv.systems.descriptor.system import DescriptorSystem
+from quasilpv.systems.intervals.chords import CHORDS, Ramp
+from quasilpv.systems.intervals.enclosure import enclose
 
 x, y, p = sp.symbols("x y p", real=True)
 HALF, LEVEL = sp.Rational(1, 2), sp.Rational(7, 10)

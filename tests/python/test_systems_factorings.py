@@ -6,9 +6,9 @@ import sympy as sp
 from numpy.testing import assert_allclose
 
 from quasilpv.systems.catalogue import system
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.factorings import MOST_FACTORINGS, factorings
-from quasilpv.systems.premise import PremiseKind
+from quasilpv.systems.descriptor.factorings import MOST_FACTORINGS, factorings
+from quasilpv.systems.descriptor.premise import PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 x3, x4 = sp.symbols("x3 x4", real=True)
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import quasilpv
 from quasilpv.errors import InputError
-from quasilpv.systems.formula import MAX_DEPTH, MAX_LENGTH, parse_equation, parse_expression
+from quasilpv.systems.descriptor.formula import MAX_DEPTH, MAX_LENGTH, parse_equation, parse_expression
 
 x, v, u = sp.symbols("x v u", real=True)
 NAMES = {"x": x, "v": v, "u": u, "x'": sp.Symbol("x'", real=True)}

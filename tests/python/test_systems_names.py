@@ -11,9 +11,9 @@ import sympy as sp
 from numpy.testing import assert_allclose
 
 from quasilpv.errors import MOST_NAMES, InputError
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.equations import rate
-from quasilpv.systems.premise import Premise, PremiseKind
+from quasilpv.systems.descriptor.equations import rate
+from quasilpv.systems.descriptor.premise import Premise, PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 x, v, P, u = sp.symbols("x v P u", real=True)
 t = sp.Symbol("t")

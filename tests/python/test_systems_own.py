@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from quasilpv.errors import InputError
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import PremiseKind
+from quasilpv.systems.descriptor.premise import PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 x, y, p = sp.symbols("x y p", real=True)
 DOMAIN = {x: (-1.5, 2.0), y: (0.25, 3.0), p: (-0.5, 0.5)}

@@ -16,8 +16,8 @@ from quasilpv.systems.catalogue import SYSTEMS, system_kind, system_names
 
 OSCILLATOR = '''
 import sympy as sp
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.equations import rate
+from quasilpv.systems.descriptor.system import DescriptorSystem
+from quasilpv.systems.descriptor.equations import rate
 from beside import FRICTION
 
 print("loaded")

@@ -11,7 +11,7 @@ from quasilpv.errors import InputError
 from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.lmi.feasibility import decide
 from quasilpv.polytopes import polytopic_model
-from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 THREE = ["x**2/4", "x/2*(1 - x/2)", "1 - x/2"]  # of 0 <= x <= 2, not negative, sum 1
 

@@ -7,9 +7,9 @@ import pytest
 import sympy as sp
 
 from quasilpv.systems.catalogue import SYSTEMS, system
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import Premise
-from quasilpv.systems.structure import Standing, StructureVerdict, structure_report
+from quasilpv.systems.descriptor.premise import Premise
+from quasilpv.systems.descriptor.structure import Standing, StructureVerdict, structure_report
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 x, y, w = sp.symbols("x y w", real=True)
 REGULAR = {"ex-I.1", "ex-II.9", "ex-II.8", "arm2", "arm3"}

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 
 from quasilpv.errors import InputError
 from quasilpv.systems.catalogue import SYSTEMS, system
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import Premise, PremiseKind
+from quasilpv.systems.descriptor.premise import Premise, PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 UNCERTAIN = ["ex-III.10", "ex-III.11", "ex-III.12", "spring-disc"]
 MODELS = {name: system(name) for name in UNCERTAIN}

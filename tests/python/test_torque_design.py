@@ -21,10 +21,10 @@ from quasilpv.release import Release, release, to_artifact
 from quasilpv.scenarios import Sensors
 from quasilpv.synthesis import Specification
 from quasilpv.synthesis.plant_grid import PlantGrid
-from quasilpv.synthesis.torque_design import TorqueDesign, design_torque_law, holds_exactly
-from quasilpv.synthesis.torque_law import tracking_design
-from quasilpv.synthesis.torque_schedule import ScheduledPlants, schedule
-from quasilpv.systems.registry import robot
+from quasilpv.synthesis.torque.design import TorqueDesign, design_torque_law, holds_exactly
+from quasilpv.synthesis.torque.law import tracking_design
+from quasilpv.synthesis.torque.schedule import ScheduledPlants, schedule
+from quasilpv.systems.robots.registry import robot
 from reference.step import DobTorque, OutputStage, Sample
 
 FloatArray = npt.NDArray[np.float64]

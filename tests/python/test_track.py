@@ -27,7 +27,7 @@ from quasilpv.release import release
 from quasilpv.scenarios import IdaIntegrator, Rk4Integrator, Scenario, Sensors, build_scenario
 from quasilpv.synthesis import Specification, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import Robot, robot
+from quasilpv.systems.robots.registry import Robot, robot
 from reference.runs import synthetic_run
 
 EXACT = Sensors(encoder_bits=0, velocity_noise_rad_s=0.0)

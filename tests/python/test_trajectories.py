@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from quasilpv.artifact.canonical import canonical_json, with_hash
 from quasilpv.errors import InputError
-from quasilpv.systems.arm_parameters import OperatingDomain
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.arm_parameters import OperatingDomain
+from quasilpv.systems.robots.registry import robot
 from quasilpv.trajectories import (
     TaskPath,
     Trajectory,

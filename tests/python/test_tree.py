@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from quasilpv.errors import InputError
-from quasilpv.systems.spatial import Placement, SpatialInertia
-from quasilpv.systems.tree import JointKind, KinematicTree, TreeJoint, merged
+from quasilpv.systems.robots.spatial import Placement, SpatialInertia
+from quasilpv.systems.robots.tree import JointKind, KinematicTree, TreeJoint, merged
 from reference.random_trees import coordinates, pinocchio_tree, random_body, random_rotation, random_tree
 
 seeds = st.integers(0, 2**32 - 1)

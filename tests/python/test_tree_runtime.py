@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from quasilpv import _runtime
 from quasilpv.artifact.canonical import canonical_json
 from quasilpv.errors import InputError
-from quasilpv.systems.tree import KinematicTree
+from quasilpv.systems.robots.tree import KinematicTree
 from reference.random_trees import coordinates, pinocchio_tree, random_tree
 
 seeds = st.integers(0, 2**32 - 1)

@@ -14,12 +14,15 @@ from quasilpv.errors import InfeasibleError
 from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.velocity_law import VelocityLaw
 from quasilpv.release import Release, release
-from quasilpv.synthesis import CONTROLLERS, Specification, baselines, specification, tuned_baselines, tuning_search
-from quasilpv.synthesis.acceleration_design import design_acceleration_law
+from quasilpv.synthesis import CONTROLLERS, Specification, specification
+from quasilpv.synthesis.acceleration.design import design_acceleration_law
+from quasilpv.synthesis.baselines import printed as baselines
+from quasilpv.synthesis.baselines import tuned as tuned_baselines
+from quasilpv.synthesis.baselines import tuning_search
 from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.synthesis.progress import no_progress
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from reference.step import ComputedTorque, OutputStage, Pid, Sample, SpeedFilter
 
 FloatArray = npt.NDArray[np.float64]

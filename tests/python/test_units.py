@@ -19,7 +19,7 @@ from quasilpv.studies import Answer, Sweep, Verdict
 from quasilpv.studies.examination import stated
 from quasilpv.studies.front_door import question
 from quasilpv.systems.catalogue import system
-from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from random_systems import random_system
 from rescaled_systems import rescaled
 from test_conditions_boundaries import LIMITS

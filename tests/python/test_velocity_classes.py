@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quasilpv.studies.eigenvalue_bounds import TrigonometricPencil, largest_eigenvalue
-from quasilpv.studies.velocity_classes import VelocityClasses
-from quasilpv.systems.registry import robot
+from quasilpv.reproduction.observers.eigenvalue_bounds import TrigonometricPencil, largest_eigenvalue
+from quasilpv.reproduction.observers.velocity_classes import VelocityClasses
+from quasilpv.systems.robots.registry import robot
 
 ARM = robot("arm3")
 ANGLES = np.array(ARM.domain.angle_rad).T

@@ -31,8 +31,8 @@ from quasilpv.studies.frozen_modes import (
 )
 from quasilpv.studies.refutation import IMPLIED, refutation
 from quasilpv.systems.catalogue import system
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix, Premise
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from random_systems import random_system
 from test_conditions_soundness import CASES
 

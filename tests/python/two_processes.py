@@ -28,7 +28,7 @@ from quasilpv.artifact import read_artifact, write_artifact
 from quasilpv.release import release
 from quasilpv.scenarios import EXTERNAL_TORQUE, build_scenario, read_scenario, write_scenario
 from quasilpv.synthesis import Specification
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from quasilpv.trajectories import serial_square
 from quasilpv.trajectories.document import write_trajectory
 

@@ -19,7 +19,7 @@ import numpy as np
 from bench_map import measure_map
 from bench_report import DisagreementError, Report, Row, main, row
 
-from quasilpv.conditions.sampled_chains import (
+from quasilpv.conditions.tracking.sampled_chains import (
     FEEDBACK_DISK,
     OBSERVER_DISK,
     ChainGains,

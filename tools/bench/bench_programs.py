@@ -30,7 +30,7 @@ from quasilpv.scenarios import (
     write_scenario,
 )
 from quasilpv.synthesis import Specification
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 from quasilpv.trajectories import serial_square
 from quasilpv.trajectories.document import write_trajectory
 

@@ -10,7 +10,7 @@ from typing import Any
 _HOMES = {
     "Answer": "studies.answer",
     "Artifact": "artifact",
-    "DescriptorSystem": "systems.descriptor",
+    "DescriptorSystem": "systems.descriptor.system",
     "Evidence": "studies.answer",
     "InputError": "errors",
     "Law": "studies.law",
@@ -18,12 +18,12 @@ _HOMES = {
     "boundary": "studies.front_door",
     "design": "chain",
     "gate": "chain",
-    "rate": "systems.equations",
+    "rate": "systems.descriptor.equations",
     "region": "studies.front_door",
     "robot": "chain",
     "simulate": "chain",
     "solve": "studies.front_door",
-    "structure_report": "systems.structure",
+    "structure_report": "systems.descriptor.structure",
     "verify": "chain",
 }
 

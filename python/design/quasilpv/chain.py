@@ -45,8 +45,8 @@ from quasilpv.release import checked_artifact
 from quasilpv.scenarios import Sensors, SineTorque, motions_of, tracking_tasks
 from quasilpv.synthesis import DEFAULT_CONTROLLER, specification_for, synthesise, without_compensation
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems import registry
-from quasilpv.systems.registry import Robot
+from quasilpv.systems.robots import registry
+from quasilpv.systems.robots.registry import Robot
 from quasilpv.trajectories import TaskPath, Trajectory, plan
 
 __all__ = ["Design", "GateResult", "Simulation", "design", "gate", "robot", "simulate", "verify"]

@@ -21,10 +21,10 @@ from quasilpv.certificate import CHECKERS, Evidence, gate, verify
 from quasilpv.errors import ClaimError
 from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, synthesise, without_compensation
 from quasilpv.synthesis.actuator_demand import MotionsOf, no_motions, unmet_demands
-from quasilpv.synthesis.baselines import reference_speeds
+from quasilpv.synthesis.baselines.printed import reference_speeds
 from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import Robot, robot
+from quasilpv.systems.robots.registry import Robot, robot
 
 NEEDED_OF_CLAIMS = Evidence.ENCLOSED
 """Every claim of a released artifact is proved; a sampled one does not suffice."""

@@ -15,7 +15,7 @@ from quasilpv.artifact.compilation import compile_program
 from quasilpv.artifact.schema import REQUIRED_PROGRAMS
 from quasilpv.errors import InputError
 from quasilpv.polytopes import BlockPolytope
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 
 Change: TypeAlias = Callable[[dict[str, Any]], None]
 

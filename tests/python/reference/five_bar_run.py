@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from quasilpv.artifact import Artifact, evaluate
 from quasilpv.certificate.vertex_tables import VertexTable
-from quasilpv.systems.fivebar_linkage import FiveBarLinkage
+from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
 from quasilpv.trajectories import Trajectory
 from reference.step import (
     ComputedTorque,

@@ -14,9 +14,9 @@ from quasilpv.certificate.gate_loop import AccelerationLoopData
 from quasilpv.release import to_artifact
 from quasilpv.synthesis import Specification, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
-from quasilpv.systems.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
-from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.registry import Robot, robot
+from quasilpv.systems.robots.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
+from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.registry import Robot, robot
 
 FloatArray = npt.NDArray[np.float64]
 

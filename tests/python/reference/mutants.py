@@ -10,7 +10,7 @@ from types import ModuleType
 
 import pytest
 
-BLOCKS = "quasilpv.conditions.blocks"
+BLOCKS = "quasilpv.conditions.forms.blocks"
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ import sympy as sp
 from quasilpv.artifact.canonical import canonical_json, with_hash
 from quasilpv.artifact.compilation import compile_program
 from quasilpv.polytopes import BlockPolytope
-from quasilpv.systems.arm_parameters import Link as ArmLink
-from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.premise import AffineMatrix
+from quasilpv.systems.descriptor.premise import AffineMatrix
+from quasilpv.systems.robots.arm_parameters import Link as ArmLink
+from quasilpv.systems.robots.arms import PlanarSerialArm
 from reference.serial_arm import Link, SerialArm
 
 SAMPLE_PERIOD_S = 1e-3

@@ -3,8 +3,8 @@
 import numpy as np
 import pinocchio as pin
 
-from quasilpv.systems.spatial import Placement, SpatialInertia
-from quasilpv.systems.tree import JointKind, KinematicTree, TreeJoint
+from quasilpv.systems.robots.spatial import Placement, SpatialInertia
+from quasilpv.systems.robots.tree import JointKind, KinematicTree, TreeJoint
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from quasilpv.conditions.iv11_reduced import FeedbackPoint, ObserverPoint
-from quasilpv.conditions.sampled_chains import ChainGains
+from quasilpv.conditions.tracking.iv11_reduced import FeedbackPoint, ObserverPoint
+from quasilpv.conditions.tracking.sampled_chains import ChainGains
 from quasilpv.polytopes import BlockPolytope
 
 PERIOD_S = 1e-3

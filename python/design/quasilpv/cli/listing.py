@@ -20,7 +20,7 @@ def listing_command(json: JsonOption = False) -> None:
     from quasilpv.reproduction import ITEMS
     from quasilpv.scenarios import tracking_tasks
     from quasilpv.systems.catalogue import system_names
-    from quasilpv.systems.registry import robots
+    from quasilpv.systems.robots.registry import robots
 
     known: dict[str, list[dict[str, Any]]] = {
         "robots": [{"id": robot.id, "summary": robot.summary} for robot in robots()],

@@ -132,7 +132,7 @@ def specification(
     Raises:
         InputError: an unknown robot, or a number out of range.
     """
-    from quasilpv.systems.registry import robot
+    from quasilpv.systems.robots.registry import robot
 
     return specification_for(
         robot(robot_id),

@@ -52,7 +52,7 @@ def synth_command(
     Example:
       design synth arm3 --rate-hz 2000 -o out/arm3-2khz
     """
-    from quasilpv.systems.registry import robot
+    from quasilpv.systems.robots.registry import robot
 
     robot(robot_id)
     design = require_controller(controller)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from quasilpv.cli.session import Session
     from quasilpv.experiments.result import TrackResult, Variant
     from quasilpv.experiments.track import TrackingExperiment
-    from quasilpv.systems.registry import Robot
+    from quasilpv.systems.robots.registry import Robot
 
 DEFAULT_CONTROLLERS = (
     "pid",
@@ -160,7 +160,7 @@ def _follower(given: Artifact | None, robot_id: str | None) -> Robot:
         InputError: there is neither, they differ, or the registry does not know the robot.
     """
     from quasilpv.experiments.track import robot_of
-    from quasilpv.systems.registry import robot
+    from quasilpv.systems.robots.registry import robot
 
     if given is None and robot_id is None:
         raise InputError("command line", "--robot", "nothing", "who follows --trajectory, or --artifact FILE")

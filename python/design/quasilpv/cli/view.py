@@ -17,7 +17,7 @@ from quasilpv.errors import InputError, TransportError
 
 if TYPE_CHECKING:
     from quasilpv.artifact import Artifact
-    from quasilpv.systems.mechanism import PlanarMechanism
+    from quasilpv.systems.robots.mechanism import PlanarMechanism
     from quasilpv.view.live import LiveMotion
     from quasilpv.view.page import Page
     from quasilpv.view.playback import Motion
@@ -118,7 +118,7 @@ def _first_samples(listener: LiveMotion, url: str, timeout_s: float) -> Motion:
 def _mechanism(controller: Artifact, scenario: Path | None) -> PlanarMechanism:
     from quasilpv.experiments.logged import mechanism_of
     from quasilpv.scenarios import read_scenario
-    from quasilpv.systems.registry import robot
+    from quasilpv.systems.robots.registry import robot
 
     return robot(controller.robot.id).model if scenario is None else mechanism_of(read_scenario(scenario).plant)
 

@@ -10,9 +10,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from quasilpv.conditions.blocks import double_sum, single_sum
 from quasilpv.conditions.choices import Form as Form  # noqa: PLC0414 -- also from here
 from quasilpv.conditions.choices import Slack
+from quasilpv.conditions.forms.blocks import double_sum, single_sum
 from quasilpv.conditions.gains import DelayedFeedback, DescriptorGain, Gain, ObserverGain, PolytopicGain
 from quasilpv.conditions.reliance import Reliance, Relied, refuse_refuted, reliances
 from quasilpv.defaults import SAMPLE_PERIOD_S

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from quasilpv.polytopes.block_polytope import BlockPolytope
 from quasilpv.polytopes.units import Units
-from quasilpv.systems.premise import AffineMatrix
+from quasilpv.systems.descriptor.premise import AffineMatrix
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -13,14 +13,14 @@ from itertools import product
 
 import numpy as np
 
-from quasilpv.conditions.blocks import single_sum
+from quasilpv.conditions.forms.blocks import single_sum
 from quasilpv.lmi import Expression, Problem, Variable, is_positive_definite, to_rational
 from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.lmi.exact import Matrix, null_space, symmetric_part
 from quasilpv.lmi.expressions import as_expression
 from quasilpv.lmi.feasibility import decide
 from quasilpv.polytopes import BlockPolytope
-from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 MAX_CORNERS_OF = 6
 """Premises whose corners are all looked at; of more, every one is a block of its own, with slack."""
@@ -33,7 +33,7 @@ WELL_CONDITIONED = 1e12
 def proof_of_invertibility(*systems: DescriptorSystem) -> str | None:
     """How E_1(z), the block of E of the differential states, was proved invertible over the box; None if it was not.
 
-    That it was not says nothing: `quasilpv.systems.structure` has other means, and those that refute.
+    That it was not says nothing: `quasilpv.systems.descriptor.structure` has other means, and those that refute.
 
     Args:
         systems: one, or several with the same premises that differ in numbers: then every convex combination of them.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from quasilpv.conditions import (
+from quasilpv.conditions.condition import Condition
+from quasilpv.conditions.theorems import (
     estimated_observer,
     guerra2007,
     i1,
@@ -20,7 +21,6 @@ from quasilpv.conditions import (
     tanaka_wang,
     ts_pj,
 )
-from quasilpv.conditions.condition import Condition
 from quasilpv.errors import InputError, one_of
 
 CONDITIONS: dict[str, Condition] = {

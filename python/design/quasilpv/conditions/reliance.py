@@ -18,9 +18,9 @@ from quasilpv.conditions.invertibility import proof_of_invertibility
 from quasilpv.errors import InputError
 from quasilpv.lmi.exact import null_space, to_rational
 from quasilpv.polytopes import PolytopicModel
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import PremiseKind
-from quasilpv.systems.structure import Finding, Standing, StructureReport, structure_report
+from quasilpv.systems.descriptor.premise import PremiseKind
+from quasilpv.systems.descriptor.structure import Finding, Standing, StructureReport, structure_report
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 
 class Reliance(StrEnum):

@@ -9,8 +9,8 @@ from math import inf, isfinite
 import numpy as np
 
 from quasilpv.errors import InputError, one_of
-from quasilpv.systems.spatial import FloatArray, Placement, SpatialInertia
-from quasilpv.systems.tree import JointKind, KinematicTree, TreeJoint
+from quasilpv.systems.robots.spatial import FloatArray, Placement, SpatialInertia
+from quasilpv.systems.robots.tree import JointKind, KinematicTree, TreeJoint
 
 BASE = -1
 """Index of the body that does not move."""

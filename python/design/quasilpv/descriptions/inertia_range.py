@@ -18,7 +18,7 @@ from quasilpv.certificate.chain import ChainForm, ChainJoint, prove_chain
 from quasilpv.certificate.exact_matrices import matrix, rational
 from quasilpv.descriptions.spatial_robot import SpatialRobot
 from quasilpv.synthesis.chain_storages import InertiaPairing, Side, find_storages
-from quasilpv.systems.tree import KinematicTree
+from quasilpv.systems.robots.tree import KinematicTree
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -16,8 +16,8 @@ import numpy as np
 from quasilpv.descriptions.described_tree import BASE, DescribedJoint, DescribedTree
 from quasilpv.descriptions.safe_xml import check_includes, read_xml, root_of
 from quasilpv.errors import InputError
-from quasilpv.systems.spatial import FloatArray, Placement, SpatialInertia
-from quasilpv.systems.tree import JointKind
+from quasilpv.systems.robots.spatial import FloatArray, Placement, SpatialInertia
+from quasilpv.systems.robots.tree import JointKind
 
 
 def read_mjcf(path: Path) -> DescribedTree:

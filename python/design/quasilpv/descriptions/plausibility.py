@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quasilpv.errors import InputError
-from quasilpv.systems.tree import KinematicTree
+from quasilpv.systems.robots.tree import KinematicTree
 
 ROUNDING = 1e-6
 """Descriptions print inertias with few digits: what they break by less, relative to the largest moment, is rounding."""

@@ -25,8 +25,8 @@ from quasilpv.descriptions.spatial_robot import PayloadBody, SpatialJoint, Spati
 from quasilpv.descriptions.urdf import read_urdf
 from quasilpv.errors import InputError, one_of
 from quasilpv.files import read_bytes
-from quasilpv.systems.spatial import Placement
-from quasilpv.systems.tree import JointKind
+from quasilpv.systems.robots.spatial import Placement
+from quasilpv.systems.robots.tree import JointKind
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]

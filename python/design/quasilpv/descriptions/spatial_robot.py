@@ -7,8 +7,8 @@ from itertools import product
 
 import numpy as np
 
-from quasilpv.systems.spatial import SpatialInertia
-from quasilpv.systems.tree import KinematicTree
+from quasilpv.systems.robots.spatial import SpatialInertia
+from quasilpv.systems.robots.tree import KinematicTree
 
 Interval = tuple[float, float]
 

@@ -17,8 +17,8 @@ from quasilpv.descriptions.described_tree import BASE, DescribedJoint, Described
 from quasilpv.descriptions.library_output import captured_stderr
 from quasilpv.descriptions.safe_xml import read_xml, root_of
 from quasilpv.errors import InputError
-from quasilpv.systems.spatial import FloatArray, Placement, SpatialInertia
-from quasilpv.systems.tree import JointKind
+from quasilpv.systems.robots.spatial import FloatArray, Placement, SpatialInertia
+from quasilpv.systems.robots.tree import JointKind
 
 GRAVITY_M_S2 = 9.81
 FASTEST = 1000.0

@@ -16,7 +16,7 @@ from quasilpv.release import checked_artifact, design_inputs
 from quasilpv.synthesis import Specification, synthesise, without_compensation
 from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 
 DEFAULT_CACHE = Path("out/cache")
 

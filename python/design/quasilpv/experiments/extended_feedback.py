@@ -19,11 +19,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
-from quasilpv.conditions import i53
 from quasilpv.conditions.condition import Feedback, Options
+from quasilpv.conditions.theorems import i53
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.polytopes.representation import polytopic_model
-from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -11,12 +11,12 @@ from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import Run
 from quasilpv.experiments.track import run_from_columns, summarise_as
 from quasilpv.scenarios import FiveBarPlant, LinkParameters, Plant, SerialArmPlant
-from quasilpv.systems.arm_parameters import Link
-from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.fivebar import RhombicFiveBar
-from quasilpv.systems.fivebar_linkage import FiveBarLinkage
-from quasilpv.systems.mechanism import PlanarMechanism
-from quasilpv.systems.rolling_disc import RollingDisc
+from quasilpv.systems.robots.arm_parameters import Link
+from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.fivebar import RhombicFiveBar
+from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
+from quasilpv.systems.robots.mechanism import PlanarMechanism
+from quasilpv.systems.robots.rolling_disc import RollingDisc
 from quasilpv.telemetry import RunLog
 from quasilpv.telemetry.recording import columns_of
 

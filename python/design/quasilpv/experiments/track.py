@@ -26,8 +26,8 @@ from quasilpv.scenarios import (
     tracking_task,
     write_scenario,
 )
-from quasilpv.systems.mechanism import PlanarMechanism
-from quasilpv.systems.registry import Robot, robot, robots
+from quasilpv.systems.robots.mechanism import PlanarMechanism
+from quasilpv.systems.robots.registry import Robot, robot, robots
 from quasilpv.telemetry import LOG_NAME, Mode, RunHeader
 from quasilpv.telemetry.recording import RunDocuments, write_run
 from quasilpv.trajectories import Trajectory, plan, read_path, write_trajectory

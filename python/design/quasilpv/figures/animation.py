@@ -23,7 +23,7 @@ from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.style import BLACK, BLUE, REFERENCE_COLOUR, VERMILION, WIDTH_IN, length_unit, style
 from quasilpv.files import write_atomically
-from quasilpv.systems.mechanism import PlanarMechanism
+from quasilpv.systems.robots.mechanism import PlanarMechanism
 
 FRAMES_PER_SECOND = 20
 PIXELS_PER_INCH = 100

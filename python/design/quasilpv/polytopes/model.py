@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from quasilpv.errors import InputError
 from quasilpv.polytopes.block_polytope import BlockPolytope
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import PremiseKind
+from quasilpv.systems.descriptor.premise import PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 ExactMatrix: TypeAlias = npt.NDArray[Any]
 """Array of `fractions.Fraction`."""

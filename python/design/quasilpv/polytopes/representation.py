@@ -8,7 +8,7 @@ from quasilpv.defaults import REPRESENTATIONS
 from quasilpv.errors import InputError
 from quasilpv.polytopes.block_polytope import BlockPolytope
 from quasilpv.polytopes.model import PolytopicModel, unknown_premises
-from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 AT_ZERO = "@0"
 """Suffix that centres blocks at z = 0, as Dehak 2022, (II.10) does, instead of at the centre of the box."""

@@ -22,8 +22,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from quasilpv.polytopes.units import Units
-from quasilpv.systems.descriptor import DescriptorSystem, SystemMatrices
-from quasilpv.systems.premise import AffineMatrix
+from quasilpv.systems.descriptor.premise import AffineMatrix
+from quasilpv.systems.descriptor.system import DescriptorSystem, SystemMatrices
 
 FloatArray = NDArray[np.float64]
 

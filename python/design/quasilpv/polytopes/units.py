@@ -20,8 +20,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix, PremiseKind
+from quasilpv.systems.descriptor.premise import AffineMatrix, PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 FloatArray = NDArray[np.float64]
 

@@ -127,8 +127,8 @@ def _fig_ii5(effort: Effort) -> Finding:
         {**sizes(regions), "theta_max/pi": {f"{m3:g}": found for m3, found in angles.items()}},
         {"": nested_figure(regions, title, ("mass m3 of link 3 (kg)", "largest joint angle theta_max (rad)"))},
         instead=f"Theorem II.5 and TS do agree, but their limit of theta_max/pi depends on m3 ({words}). Theorem II.6"
-        " is feasible for every fully actuated arm, by a closed form (conditions/matched.py): its region shows no merit"
-        " of the condition; a test with content would bound the gains",
+        " is feasible for every fully actuated arm, by a closed form (conditions/theorems/matched.py): its region shows"
+        " no merit of the condition; a test with content would bound the gains",
     )
 
 

@@ -22,8 +22,8 @@ from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.scenarios import Sensors
 from quasilpv.synthesis import Specification
-from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.registry import Robot
+from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.registry import Robot
 
 PlantName: TypeAlias = Literal["nominal", "perturbed", "chapter-III"]
 Observer: TypeAlias = Literal["whole", "without compensation", "without disturbance"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from quasilpv.conditions.condition import Options
-from quasilpv.conditions.slack import Slack, slack_family
+from quasilpv.conditions.forms.slack import Slack, slack_family
 from quasilpv.reproduction.counting import Row, printed_labels, single_sum, symmetric, table_finding
 from quasilpv.reproduction.item import Effort, Finding, Item
 from quasilpv.reproduction.synthetic import counted, single_sum_at

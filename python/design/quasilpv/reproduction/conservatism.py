@@ -18,8 +18,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from quasilpv.conditions.condition import Options
-from quasilpv.conditions.extended import extended_state
-from quasilpv.conditions.slack import Slack
+from quasilpv.conditions.forms.extended import extended_state
+from quasilpv.conditions.forms.slack import Slack
 from quasilpv.figures.style import BLUE, ORANGE, VERMILION, new_figure, style
 from quasilpv.lmi.exact import rank_factors
 from quasilpv.reproduction import rules

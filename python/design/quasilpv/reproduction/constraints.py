@@ -18,8 +18,8 @@ from quasilpv.experiments.run import FloatArray
 from quasilpv.experiments.track import TrackingExperiment
 from quasilpv.reproduction.closed_loops import Outcome
 from quasilpv.scenarios import build_scenario
-from quasilpv.systems.fivebar import RhombicFiveBar
-from quasilpv.systems.rolling_disc import RollingDisc
+from quasilpv.systems.robots.fivebar import RhombicFiveBar
+from quasilpv.systems.robots.rolling_disc import RollingDisc
 
 
 @dataclass(frozen=True, eq=False)

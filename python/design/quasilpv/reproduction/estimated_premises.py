@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from quasilpv.conditions.mismatch import FloatArray
+from quasilpv.conditions.forms.mismatch import FloatArray
 from quasilpv.errors import InfeasibleError
 from quasilpv.figures.style import BLUE, GREEN, ORANGE, VERMILION, legend_below, new_figure, style
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.item import Check, Effort, Finding, Item
+from quasilpv.reproduction.observers.eigenvalue_bounds import Bound
+from quasilpv.reproduction.observers.speed_estimates import Observer, speed_errors
+from quasilpv.reproduction.observers.speed_observer import SpeedObserver, speed_observer
+from quasilpv.reproduction.observers.velocity_classes import VelocityClasses
 from quasilpv.scenarios import tracking_task
-from quasilpv.studies.eigenvalue_bounds import Bound
-from quasilpv.studies.speed_estimates import Observer, speed_errors
-from quasilpv.studies.velocity_classes import VelocityClasses
-from quasilpv.synthesis.speed_observer import SpeedObserver, speed_observer
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 
 GAMMA_2 = (-75.0, -25.0, 25.0, 75.0)
 """Values of the second constant of quadratic inner-boundedness, N m s/rad."""

@@ -22,12 +22,12 @@ from quasilpv.reproduction import rules
 from quasilpv.reproduction.item import Check, Effort, Finding, Item
 from quasilpv.scenarios import Sensors
 from quasilpv.synthesis import Specification, synthesise
+from quasilpv.synthesis.acceleration.lumped_premises import lumped_acceleration_law, with_premises_lumped
 from quasilpv.synthesis.inertia_schedule import schedule_of
-from quasilpv.synthesis.lumped_premises import lumped_acceleration_law, with_premises_lumped
-from quasilpv.synthesis.torque_design import TorqueBandwidth, torque_design_at
-from quasilpv.synthesis.torque_law import tracking_design
+from quasilpv.synthesis.torque.design import TorqueBandwidth, torque_design_at
+from quasilpv.synthesis.torque.law import tracking_design
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import robot
+from quasilpv.systems.robots.registry import robot
 
 PARTITIONS: Mapping[str, tuple[int, ...]] = {"three": (0, 1, 2), "two": (1, 2), "one": (2,), "none": ()}
 """Indices of the premises that stay measured, of cos theta_2, cos theta_3, cos(theta_2 + theta_3)."""

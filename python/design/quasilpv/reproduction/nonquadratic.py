@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
 from quasilpv.conditions.condition import Options
+from quasilpv.conditions.forms.slack import Slack
 from quasilpv.conditions.registry import condition
-from quasilpv.conditions.slack import Slack
 from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, new_figure, style
 from quasilpv.lmi import Outcome
 from quasilpv.lmi.compiled import CompiledProblem
@@ -23,7 +23,7 @@ from quasilpv.reproduction.item import Check, Effort, Finding, Item
 from quasilpv.studies.answer import Verdict
 from quasilpv.studies.boundary import Interval
 from quasilpv.studies.question import Question, Sweep
-from quasilpv.systems.premise import AffineMatrix
+from quasilpv.systems.descriptor.premise import AffineMatrix
 
 METHODS = {
     "TS-Pj": ("TS-Pj", "ts"),

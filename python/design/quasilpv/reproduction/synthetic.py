@@ -12,13 +12,13 @@ import numpy as np
 import sympy as sp
 
 from quasilpv.conditions.condition import Form, Options
+from quasilpv.conditions.forms.slack import Slack
 from quasilpv.conditions.registry import condition
-from quasilpv.conditions.slack import Slack
 from quasilpv.polytopes import PolytopicModel, polytopic_model
 from quasilpv.reproduction.counting import equal_indices
 from quasilpv.studies.complexity import Complexity, measured
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix, Premise
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 
 def counted(name: str, *, order: int, inputs: int, premises: int) -> Complexity:

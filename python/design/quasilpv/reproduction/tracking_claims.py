@@ -12,7 +12,7 @@ from quasilpv.reproduction import rules
 from quasilpv.reproduction.closed_loops import Outcome
 from quasilpv.reproduction.item import Check
 from quasilpv.scenarios import VELOCITY_NOISE_RAD_S
-from quasilpv.synthesis.baselines import DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S
+from quasilpv.synthesis.baselines.printed import DISTURBANCE_OBSERVER_BANDWIDTH_RAD_S
 
 RATE_HZ = 4000.0
 """Sample rate of controllers that are compared; those of the source are in continuous time."""

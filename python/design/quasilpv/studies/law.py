@@ -11,8 +11,8 @@ import numpy.typing as npt
 from quasilpv.conditions.condition import Feedback
 from quasilpv.conditions.gains import DelayedFeedback, DescriptorGain, Gain, MemorylessGain, ObserverGain
 from quasilpv.errors import InputError
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from quasilpv.lmi import budget
 from quasilpv.lmi.budget import Limits, TimeUpError
 from quasilpv.studies.answer import Answer, Verdict
 from quasilpv.studies.refutation import Refutation
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.factorings import factorings
+from quasilpv.systems.descriptor.factorings import factorings
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 SHOWN_PREMISES = 6
 _SAME = 1e-9  # of values of premises: points of a refutation are decided in rationals and kept in doubles

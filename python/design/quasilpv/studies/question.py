@@ -33,8 +33,8 @@ from quasilpv.studies.law import Law
 from quasilpv.studies.other_factorings import with_other_factorings
 from quasilpv.studies.refutation import IMPLIED
 from quasilpv.systems.catalogue import system_kind
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix
+from quasilpv.systems.descriptor.premise import AffineMatrix
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.system_kind import SystemKind
 
 BETWEEN = 0.40625

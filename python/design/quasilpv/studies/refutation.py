@@ -26,8 +26,8 @@ from quasilpv.lmi import budget
 from quasilpv.lmi.exact import Matrix, to_rational
 from quasilpv.polytopes import PolytopicModel
 from quasilpv.studies.frozen_modes import Disk, HalfPlane, Mode, Stable, eliminated, unreachable_mode
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.premise import AffineMatrix, Premise
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

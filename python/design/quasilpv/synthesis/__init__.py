@@ -17,7 +17,7 @@ from quasilpv.synthesis.specification import Specification
 
 if TYPE_CHECKING:
     from quasilpv.synthesis.tracking_design import TrackingDesign
-    from quasilpv.systems.registry import Robot
+    from quasilpv.systems.robots.registry import Robot
 
 
 @dataclass(frozen=True)
@@ -43,58 +43,60 @@ class ControllerKind:
 
 
 CONTROLLERS: Mapping[str, ControllerKind] = {
-    "pid": ControllerKind("PID with feedforward, gains of Dehak 2022 (III.55), measured speeds", "baselines.pid"),
+    "pid": ControllerKind(
+        "PID with feedforward, gains of Dehak 2022 (III.55), measured speeds", "baselines.printed.pid"
+    ),
     "ctc": ControllerKind(
-        "computed torque, gains of Dehak 2022 (III.57), measured speeds", "baselines.computed_torque"
+        "computed torque, gains of Dehak 2022 (III.57), measured speeds", "baselines.printed.computed_torque"
     ),
     "ctc-dob": ControllerKind(
         "computed torque with a disturbance observer (Mohammadi et al. 2013), measured speeds",
-        "baselines.computed_torque_with_observer",
+        "baselines.printed.computed_torque_with_observer",
     ),
-    "pid-tuned": ControllerKind("pid, tuned as dob-acceleration is", "tuned_baselines.pid_tuned"),
-    "ctc-tuned": ControllerKind("ctc, tuned as dob-acceleration is", "tuned_baselines.computed_torque_tuned"),
+    "pid-tuned": ControllerKind("pid, tuned as dob-acceleration is", "baselines.tuned.pid_tuned"),
+    "ctc-tuned": ControllerKind("ctc, tuned as dob-acceleration is", "baselines.tuned.computed_torque_tuned"),
     "ctc-dob-tuned": ControllerKind(
-        "ctc-dob, tuned as dob-acceleration is", "tuned_baselines.computed_torque_with_observer_tuned"
+        "ctc-dob, tuned as dob-acceleration is", "baselines.tuned.computed_torque_with_observer_tuned"
     ),
     "hinf-tracking": ControllerKind(
         "H-infinity PI tracking with limited gains (Dehak 2022, Theorem III.10), measured speeds, no feedforward",
-        "hinf_tracking.hinf_tracking",
+        "hinf.hinf_tracking",
         rate_hz=4000.0,
     ),
     "pdc": ControllerKind(
         "stabilises theta = 0: scheduled state feedback of least gain (Dehak 2022, Theorem I.2), measured speeds",
-        "stabilisation.pdc",
+        "stabilising.laws.pdc",
     ),
     "descriptor": ControllerKind(
         "stabilises theta = 0: descriptor law of least gain (Dehak 2022, Theorem II.6), measured speeds",
-        "stabilisation.descriptor",
+        "stabilising.laws.descriptor",
         rate_hz=4000.0,
     ),
     "robust": ControllerKind(
         "stabilises theta = 0 with unknown inertia: feedback of least gain (Dehak 2022, Theorem III.9), speeds too",
-        "stabilisation.robust",
+        "stabilising.laws.robust",
     ),
     "delayed": ControllerKind(
         "stabilises theta = 0: descriptor law with a moving window (Dehak 2022, Theorem II.8), measured speeds",
-        "stabilisation.delayed",
+        "stabilising.laws.delayed",
     ),
     "dob-torque": ControllerKind(
         "disturbance-observer tracking at the torque level (Dehak 2022, Theorem IV.11), positions only",
-        "torque_law.torque_law",
+        "torque.law.torque_law",
         rate_hz=4000.0,
     ),
     "dob-torque-premultiplied": ControllerKind(
         "dob-torque for the equations of motion times the robot's own matrix beta (Dehak 2022, IV.5.2)",
-        "torque_law.premultiplied_torque_law",
+        "torque.law.premultiplied_torque_law",
         rate_hz=4000.0,
     ),
     "dob-moving": ControllerKind(
         "dob-acceleration with one Lyapunov function for all motions, proved; positions only",
-        "acceleration_law.moving_acceleration_law",
+        "acceleration.law.moving_acceleration_law",
     ),
     "dob-acceleration": ControllerKind(
         "disturbance-observer tracking at the acceleration level, positions only (default)",
-        "acceleration_law.acceleration_law",
+        "acceleration.law.acceleration_law",
     ),
 }
 

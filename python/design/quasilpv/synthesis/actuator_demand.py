@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from quasilpv.loops.loop_grid import configurations
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.registry import Robot
+from quasilpv.systems.robots.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
 

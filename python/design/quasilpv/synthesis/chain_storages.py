@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
-from quasilpv.systems.tree import KinematicTree
+from quasilpv.systems.robots.tree import KinematicTree
 
 FloatArray = npt.NDArray[np.float64]
 Side: TypeAlias = Literal["lowest", "highest"]

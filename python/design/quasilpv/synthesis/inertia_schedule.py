@@ -12,8 +12,8 @@ import sympy as sp
 
 from quasilpv.errors import InfeasibleError
 from quasilpv.polytopes import BlockPolytope
-from quasilpv.systems.premise import Premise
-from quasilpv.systems.registry import Robot
+from quasilpv.systems.descriptor.premise import Premise
+from quasilpv.systems.robots.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from quasilpv.loops.frozen_loop import FrozenLaw
 from quasilpv.loops.loop_grid import CONFIGURATIONS, PAYLOAD_FRACTIONS, LoopGrid, configurations
-from quasilpv.systems.registry import Robot
+from quasilpv.systems.robots.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from quasilpv.conditions.iv11_reduced import feedback_condition, observer_condition
-from quasilpv.conditions.sampled_chains import feedback_problem, observer_problem
+from quasilpv.conditions.tracking.iv11_reduced import feedback_condition, observer_condition
+from quasilpv.conditions.tracking.sampled_chains import feedback_problem, observer_problem
 from quasilpv.errors import InputError
 from quasilpv.lmi import Problem
 

@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from quasilpv.polytopes import BlockPolytope
-from quasilpv.systems.registry import Robot
+from quasilpv.systems.robots.registry import Robot
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from quasilpv.errors import InputError, one_of
-from quasilpv.systems.arm_stabilisation import arm2_kind, arm3_kind, frictionless_arm3_kind
-from quasilpv.systems.descriptor import DescriptorSystem
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.document import document_kind
-from quasilpv.systems.regular_example import regular_example
-from quasilpv.systems.singular_examples import rotation_example, singular_example, uncertain_example
-from quasilpv.systems.spring_disc import spring_disc
+from quasilpv.systems.examples.arm_stabilisation import arm2_kind, arm3_kind, frictionless_arm3_kind
+from quasilpv.systems.examples.regular import regular_example
+from quasilpv.systems.examples.singular import rotation_example, singular_example, uncertain_example
+from quasilpv.systems.examples.spring_disc import spring_disc
 from quasilpv.systems.system_kind import SystemKind
 from quasilpv.systems.user_code import entry_point_kind, entry_point_kinds, is_python_reference, python_file_kind
 

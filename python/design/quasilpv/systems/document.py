@@ -1,4 +1,4 @@
-"""A system as a JSON document: its equations as text, read by `quasilpv.systems.formula`. No code of it is executed.
+"""A system as a JSON document: its equations as text, read by a parser of our own. No code of it is executed.
 
     {"schema": "quasilpv.system", "schema_version": 1, "name": "oscillator", "state": ["x", "v"], "inputs": ["u"],
      "parameters": {"r": 0.5},
@@ -21,11 +21,11 @@ import sympy as sp
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from quasilpv.errors import InputError
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.formula import parse_expression
-from quasilpv.systems.open_parameters import OpenParameters
+from quasilpv.systems.descriptor.formula import parse_expression
+from quasilpv.systems.descriptor.open_parameters import OpenParameters
+from quasilpv.systems.descriptor.system import DescriptorSystem
+from quasilpv.systems.descriptor.vocabulary import exact, symbol
 from quasilpv.systems.system_kind import Parameter, SystemKind
-from quasilpv.systems.vocabulary import exact, symbol
 
 MAX_BYTES = 1_000_000
 _CACHED_SYSTEMS = 16

@@ -14,8 +14,8 @@ import sympy as sp
 
 from quasilpv.errors import InputError
 from quasilpv.systems.catalogue import system_kind
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.open_parameters import OpenParameters
+from quasilpv.systems.descriptor.open_parameters import OpenParameters
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.system_kind import Parameter, SystemKind
 from quasilpv.systems.user_code import like_default, numeric_parameters
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from math import isfinite
 
 from quasilpv.errors import InputError
-from quasilpv.systems.affine_family import AffineFamily, affine_family
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.open_parameters import OpenParameters
+from quasilpv.systems.descriptor.affine_family import AffineFamily, affine_family
+from quasilpv.systems.descriptor.open_parameters import OpenParameters
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class SystemKind:
         build: makes the system; called with every parameter by name.
         stem: the id as a part of a file name; the id itself if it is not given.
         left_open: makes the system with some parameters left open and the others as given, where that can be tried
-            (`quasilpv.systems.affine_family`): what may be marked as affine by nobody is then found out.
+            (`quasilpv.systems.descriptor.affine_family`): what may be marked as affine by nobody is then found out.
         fingerprint: changes with what the system is made from, if that may change (a user's file); empty for the
             catalogue. Results kept for later hold it.
     """

@@ -20,8 +20,8 @@ from types import ModuleType
 from typing import Any
 
 from quasilpv.errors import InputError, one_of
-from quasilpv.systems.descriptor import DescriptorSystem
-from quasilpv.systems.open_parameters import OpenParameters
+from quasilpv.systems.descriptor.open_parameters import OpenParameters
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.system_kind import Parameter, SystemKind
 
 ENTRY_POINT_GROUP = "quasilpv.systems"

@@ -23,9 +23,9 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.errors import InputError
-from quasilpv.systems.mechanism import PlanarMechanism
-from quasilpv.systems.spatial import Placement
-from quasilpv.systems.tree import KinematicTree
+from quasilpv.systems.robots.mechanism import PlanarMechanism
+from quasilpv.systems.robots.spatial import Placement
+from quasilpv.systems.robots.tree import KinematicTree
 from quasilpv.trajectories.document import Reference
 
 Array = npt.NDArray[np.float64]

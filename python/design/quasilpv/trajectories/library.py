@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from quasilpv.systems.arm_parameters import OperatingDomain
+from quasilpv.systems.robots.arm_parameters import OperatingDomain
 from quasilpv.trajectories.document import Trajectory
 from quasilpv.trajectories.paths import ArcSegment, LineSegment, Segment, SpiralSegment, TaskPath
 from quasilpv.trajectories.planned import Kinematics

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.errors import InputError
-from quasilpv.systems.spatial import Placement
+from quasilpv.systems.robots.spatial import Placement
 from quasilpv.trajectories.document import Reference
 from quasilpv.trajectories.inverse import JointPath, ToolTask
 from quasilpv.trajectories.paths import TaskPath

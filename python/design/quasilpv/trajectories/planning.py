@@ -20,9 +20,9 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.errors import InputError
-from quasilpv.systems.arm_parameters import OperatingDomain
-from quasilpv.systems.arms import PlanarSerialArm
-from quasilpv.systems.tree import KinematicTree
+from quasilpv.systems.robots.arm_parameters import OperatingDomain
+from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.tree import KinematicTree
 from quasilpv.trajectories.document import Reference, Trajectory
 from quasilpv.trajectories.inverse import JointPath, PlanarTool, SpatialTool, reached
 from quasilpv.trajectories.paths import TaskPath

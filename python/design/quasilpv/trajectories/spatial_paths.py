@@ -21,7 +21,7 @@ from quasilpv.artifact.canonical import parse_strict_json, require_bounded
 from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import read_bytes
-from quasilpv.systems.spatial import Placement
+from quasilpv.systems.robots.spatial import Placement
 from quasilpv.trajectories.paths import MAX_DURATION_S, Array, Duration, septic
 
 Vector3 = tuple[float, float, float]

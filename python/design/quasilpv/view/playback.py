@@ -15,7 +15,7 @@ from quasilpv.artifact.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.logged import logged_run
-from quasilpv.systems.mechanism import PlanarMechanism
+from quasilpv.systems.robots.mechanism import PlanarMechanism
 from quasilpv.telemetry import RunLog
 from quasilpv.telemetry.codes import STATES, word
 from quasilpv.telemetry.message_types import Records

@@ -1,0 +1,1 @@
+"""How inequalities are written, bounded and shortened: what several theorems share."""

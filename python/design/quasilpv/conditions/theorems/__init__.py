@@ -1,0 +1,1 @@
+"""One file per theorem: the conditions that the registry knows by name."""

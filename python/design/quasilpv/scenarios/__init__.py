@@ -1,0 +1,60 @@
+"""Scenarios: an experiment the simulator can run, true plant included (``docs/reference/formats.md``).
+
+Three parts: the documents (`schema`), the experiments known by name (`registry`), and the way from a robot and a
+reference to an experiment (`builder`). Encoders have 20 bits; the measured speed, which only the baseline laws read,
+carries white noise.
+"""
+
+from quasilpv.scenarios.builder import build_scenario
+from quasilpv.scenarios.registry import EXTERNAL_TORQUE, TrackingTask, motions_of, tracking_task, tracking_tasks
+from quasilpv.scenarios.schema import (
+    NOISE_SEED,
+    OPTIONAL,
+    VELOCITY_NOISE_RAD_S,
+    FiveBarPlant,
+    IdaIntegrator,
+    InitialState,
+    Integrator,
+    LinkParameters,
+    Plant,
+    Rk4Integrator,
+    Scenario,
+    Sensors,
+    SerialArmPlant,
+    SineTorque,
+    SpringDiscPlant,
+    TreeJoint,
+    TreePlant,
+    read_scenario,
+    sine_torques,
+    write_scenario,
+)
+
+__all__ = [
+    "EXTERNAL_TORQUE",
+    "NOISE_SEED",
+    "OPTIONAL",
+    "VELOCITY_NOISE_RAD_S",
+    "FiveBarPlant",
+    "IdaIntegrator",
+    "InitialState",
+    "Integrator",
+    "LinkParameters",
+    "Plant",
+    "Rk4Integrator",
+    "Scenario",
+    "Sensors",
+    "SerialArmPlant",
+    "SineTorque",
+    "SpringDiscPlant",
+    "TrackingTask",
+    "TreeJoint",
+    "TreePlant",
+    "build_scenario",
+    "motions_of",
+    "read_scenario",
+    "sine_torques",
+    "tracking_task",
+    "tracking_tasks",
+    "write_scenario",
+]

@@ -1,0 +1,303 @@
+"""The documents of a scenario: what the simulator runs, true plant included (``docs/reference/formats.md``)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from quasilpv.artifact.canonical import (
+    MAX_SAFE_INTEGER,
+    Document,
+    member_path,
+    normalise,
+    parse_strict_json,
+    require_bounded,
+)
+from quasilpv.artifact.programs import MAX_JOINTS
+from quasilpv.artifact.strict_model import LARGEST_NUMBER, FieldError, NonNegative, Positive, StrictModel, validate
+from quasilpv.defaults import ENCODER_BITS
+from quasilpv.errors import InputError
+from quasilpv.files import read_bytes, write_readable_json
+
+Tolerance = Annotated[float, Field(ge=1.0 / LARGEST_NUMBER, le=0.1)]
+Duration = Annotated[float, Field(ge=1.0 / LARGEST_NUMBER, le=86400)]
+Delay = Annotated[float, Field(ge=0, le=10)]
+Vector = tuple[float, ...]
+
+NOISE_SEED = 20220315
+"""Seed of the speed noise in every scenario of the registry: fixed, so that two runs see the same noise."""
+
+VELOCITY_NOISE_RAD_S = 0.05
+
+
+class LinkParameters(StrictModel):
+    """One link; the moment of inertia is about its joint axis."""
+
+    length_m: Positive
+    mass_kg: Positive
+    com_m: float
+    inertia_kg_m2: Positive
+    friction_nm_s: NonNegative
+
+    @model_validator(mode="after")
+    def _check_inertia(self) -> Self:
+        least = self.mass_kg * self.com_m**2
+        if self.inertia_kg_m2 < least * (1.0 - 1e-12):
+            expected = f"at least mass_kg * com_m^2 = {least:.6g}, being about the joint axis"
+            raise FieldError("inertia_kg_m2", self.inertia_kg_m2, expected)
+        return self
+
+
+class SerialArmPlant(StrictModel):
+    """A planar serial arm that hangs at theta = 0."""
+
+    kind: Literal["serial-arm"]
+    label: str
+    gravity_m_s2: float
+    links: Annotated[tuple[LinkParameters, ...], Field(min_length=1, max_length=MAX_JOINTS)]
+
+    @property
+    def joints(self) -> int:
+        """Actuated and measured joints."""
+        return len(self.links)
+
+
+class FiveBarPlant(StrictModel):
+    """A planar five-bar: two equal legs, each an active link on the motor axis and a passive one to the tool.
+
+    Attributes:
+        active: link that a motor drives; its friction is that of the motor axis.
+        passive: link from the elbow to the tool; its friction is that of the elbow.
+        spring_nm_rad: stiffness of the torsion springs on the motor axis, relaxed at ``spring_rest_rad``.
+        formulation: ``index1``, or ``ggl`` for the stabilised index-2 form.
+        baumgarte_per_s: rate at which constraint errors decay in the form of index 1.
+    """
+
+    kind: Literal["five-bar"] = "five-bar"
+    label: str
+    gravity_m_s2: float
+    active: LinkParameters
+    passive: LinkParameters
+    spring_nm_rad: NonNegative = 0.0
+    spring_rest_rad: tuple[float, float] = (0.0, 0.0)
+    formulation: Literal["index1", "ggl"] = "index1"
+    baumgarte_per_s: NonNegative = 50.0
+
+    @property
+    def joints(self) -> int:
+        """Actuated and measured joints."""
+        return 2
+
+
+class SpringDiscPlant(StrictModel):
+    """A disc that rolls without slipping, held by a damper and a hardening spring; its joint is its own rotation."""
+
+    kind: Literal["spring-disc"] = "spring-disc"
+    label: str
+    mass_kg: Positive
+    radius_m: Positive
+    inertia_kg_m2: Positive
+    inertia_uncertainty_per_kg: NonNegative
+    stiffness_n_m: NonNegative
+    cubic_stiffness_n_m3: NonNegative
+    damping_n_s_m: NonNegative
+
+    @property
+    def joints(self) -> int:
+        """Actuated and measured joints."""
+        return 1
+
+
+Row = tuple[float, float, float]
+
+
+class TreeJoint(StrictModel):
+    """One joint of a robot in space and the body it carries; the inertia is about the joint's frame.
+
+    Attributes:
+        rotation, translation_m: of the joint's frame at coordinate 0 in the frame before; rows of the rotation.
+        rotor_inertia_kg_m2: reflected to the joint.
+        coulomb_speed_rad_s: speed w0 in the friction torque ``viscous w + coulomb tanh(w / w0)``.
+    """
+
+    name: str
+    kind: Literal["revolute", "continuous", "prismatic"]
+    rotation: tuple[Row, Row, Row]
+    translation_m: Row
+    axis: Row
+    mass_kg: NonNegative
+    first_moment_kg_m: Row
+    rotational_kg_m2: tuple[Row, Row, Row]
+    rotor_inertia_kg_m2: NonNegative
+    friction_viscous_nm_s: NonNegative
+    friction_coulomb_nm: NonNegative
+    coulomb_speed_rad_s: Positive
+
+
+class TreePlant(StrictModel):
+    """A robot in space, its payload merged into its last body; gravity in the axes of the base."""
+
+    kind: Literal["tree"] = "tree"
+    label: str
+    gravity_m_s2: Row
+    # Whether rotations are rotations and bodies have positive energy, the simulator decides.
+    chain: Annotated[tuple[TreeJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
+
+    @property
+    def joints(self) -> int:
+        """Actuated and measured joints."""
+        return len(self.chain)
+
+
+class IdaIntegrator(StrictModel):
+    """SUNDIALS IDA (variable-order BDF) with its error tolerances."""
+
+    kind: Literal["ida"] = "ida"
+    relative_tolerance: Tolerance = 1e-8
+    absolute_tolerance: Tolerance = 1e-10
+
+
+class Rk4Integrator(StrictModel):
+    """The classical Runge-Kutta method with equal steps."""
+
+    kind: Literal["rk4"] = "rk4"
+    steps_per_sample: int = Field(default=4, ge=1, le=1_000_000)
+
+
+class SineTorque(StrictModel):
+    """One term ``amplitude_nm * sin(frequency_rad_s * t + phase_rad)`` on one joint."""
+
+    joint: int = Field(ge=0)
+    amplitude_nm: float
+    frequency_rad_s: float
+    phase_rad: float = 0.0
+
+
+class Sensors(StrictModel):
+    """Encoder resolution (0 bits: exact), standard deviation of the speed noise, its seed, and the filter behind it."""
+
+    encoder_bits: int = Field(default=ENCODER_BITS, ge=0, le=32)
+    velocity_noise_rad_s: NonNegative = VELOCITY_NOISE_RAD_S
+    seed: int = Field(default=NOISE_SEED, ge=0, le=MAX_SAFE_INTEGER)
+    velocity_filter_time_constant_s: NonNegative = 0.0
+
+
+class InitialState(StrictModel):
+    """Joint angles and speeds of the plant at t = 0."""
+
+    angle_rad: Vector
+    speed_rad_s: Vector
+
+
+Plant = Annotated[SerialArmPlant | FiveBarPlant | SpringDiscPlant | TreePlant, Field(discriminator="kind")]
+Integrator = Annotated[IdaIntegrator | Rk4Integrator, Field(discriminator="kind")]
+
+TAGS = ("serial-arm", "five-bar", "spring-disc", "tree", "ida", "rk4")
+"""The kinds that tell the cases of a union apart."""
+
+
+OPTIONAL = frozenset({"torque_limit_nm", "sensors.velocity_filter_time_constant_s"})
+"""Members a scenario file may leave out, as files written before they were there do."""
+
+
+def sine_torques(*terms: tuple[float, float]) -> tuple[SineTorque, ...]:
+    """External torques of one sine per joint, (amplitude in N m, frequency in rad/s) each."""
+    return tuple(
+        SineTorque(joint=joint, amplitude_nm=amplitude, frequency_rad_s=frequency)
+        for joint, (amplitude, frequency) in enumerate(terms)
+    )
+
+
+class Scenario(StrictModel):
+    """One experiment, immutable and consistent."""
+
+    schema_: Literal["quasilpv.scenario"] = Field(alias="schema")
+    schema_version: Literal[1]
+    name: Annotated[str, Field(min_length=1)]
+    duration_s: Duration
+    plant: Plant
+    integrator: Integrator
+    external_torque: Annotated[tuple[SineTorque, ...], Field(max_length=1000)]
+    sensors: Sensors
+    transport_delay_s: Delay
+    torque_limit_nm: tuple[Positive, ...] | None = None
+    initial: InitialState
+
+    def __repr__(self) -> str:
+        """What is simulated, in a line; `to_document` has all of it."""
+        return f"Scenario({self.name!r}, {self.plant.kind}, {self.plant.label!r}, {self.duration_s:g} s)"
+
+    def __str__(self) -> str:
+        """The same."""
+        return repr(self)
+
+    @model_validator(mode="after")
+    def _check_joints(self) -> Self:
+        joints = self.plant.joints
+        if self.torque_limit_nm is not None and len(self.torque_limit_nm) != joints:
+            raise FieldError("torque_limit_nm", f"{len(self.torque_limit_nm)} entries", str(joints))
+        for field in ("angle_rad", "speed_rad_s"):
+            if len(getattr(self.initial, field)) != joints:
+                raise FieldError(f"initial.{field}", f"{len(getattr(self.initial, field))} entries", str(joints))
+        for i, term in enumerate(self.external_torque):
+            if term.joint >= joints:
+                raise FieldError(f"external_torque[{i}].joint", term.joint, f"a joint index below {joints}")
+        return self
+
+    def to_document(self) -> Document:
+        """Return the scenario as a normalised JSON tree; members of `OPTIONAL` that say nothing are left out."""
+        document: Document = normalise(self.model_dump(mode="json", by_alias=True), self.name)
+        if self.torque_limit_nm is None:
+            del document["torque_limit_nm"]
+        if not self.sensors.velocity_filter_time_constant_s:
+            del document["sensors"]["velocity_filter_time_constant_s"]
+        return document
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, object], source: str = "scenario") -> Scenario:
+        """Return the scenario of a JSON tree, in which all members but `OPTIONAL` are present, defaults too.
+
+        Raises:
+            InputError: a rule of the format is broken; the message names the field.
+        """
+        require_bounded(document, source)
+        scenario = validate(cls, document, source, tags=TAGS)
+        for path in _missing_members(document, scenario.to_document(), ""):
+            raise InputError(source, path, "nothing", "this member")
+        return scenario
+
+
+def _missing_members(given: object, complete: object, path: str) -> Iterator[str]:
+    if isinstance(given, Mapping) and isinstance(complete, Mapping):
+        for key, member in complete.items():
+            if key in given:
+                yield from _missing_members(given[key], member, member_path(path, key))
+            else:
+                yield member_path(path, key)
+    elif isinstance(given, Sequence) and isinstance(complete, list):
+        for i, (item, whole) in enumerate(zip(given, complete, strict=True)):
+            yield from _missing_members(item, whole, f"{path}[{i}]")
+
+
+def write_scenario(path: Path | str, scenario: Scenario) -> Path:
+    """Write a scenario file, indented for people.
+
+    Raises:
+        InputError: the file cannot be written; nothing half-written is left behind.
+    """
+    path = Path(path)
+    write_readable_json(path, scenario.to_document())
+    return path
+
+
+def read_scenario(path: Path | str) -> Scenario:
+    """Read a scenario file.
+
+    Raises:
+        InputError: the file is missing, not strict JSON, or not a valid scenario.
+    """
+    source = str(path)
+    return Scenario.from_document(parse_strict_json(read_bytes(path), source), source)

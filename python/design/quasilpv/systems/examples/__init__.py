@@ -1,0 +1,1 @@
+"""Descriptor systems of Dehak 2022 that the catalogue knows by name."""

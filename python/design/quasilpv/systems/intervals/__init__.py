@@ -1,0 +1,1 @@
+"""Guaranteed ranges of functions over boxes, and the functions that systems are factored with."""

@@ -1,0 +1,1 @@
+"""Robots with their physical parameters: planar mechanisms, chains in space, and the registry."""
