@@ -104,7 +104,7 @@ TEST(Artifact, refuses_any_missing_member_and_names_it) {
 
 TEST(Artifact, F8_refuses_wrong_values_and_names_the_field) {
   EXPECT_THAT(refused("/schema", "quasilpv.trajectory"), HasSubstr("a.json: schema: got \"quasilpv.trajectory\""));
-  EXPECT_THAT(refused("/schema_version", 2), HasSubstr("a.json: schema_version: got 2, expected an integer in [1, 1]"));
+  EXPECT_THAT(refused("/schema_version", 3), HasSubstr("a.json: schema_version: got 3, expected an integer in [1, 2]"));
   EXPECT_THAT(refused("/design_hash", std::string(64, 'A')), HasSubstr("a.json: design_hash: "));
   EXPECT_THAT(refused("/units", "cm"), HasSubstr("a.json: units: got \"cm\", expected \"SI\""));
   EXPECT_THAT(refused("/sample_period_s", 0), HasSubstr("a.json: sample_period_s: got 0, expected a number > 0"));

@@ -15,6 +15,7 @@ PACKAGE = ROOT / "python" / "design" / "quasilpv"
 LAYERS = (
     {"", "errors", "defaults"},
     {"files"},
+    {"documents"},
     {"systems"},
     {"polytopes"},
     {"loops"},

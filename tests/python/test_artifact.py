@@ -18,7 +18,7 @@ VERTICES = ("law", "inertia", "blocks", 0, "vertices")
     ("change", "field", "message"),
     [
         (at("schema", value="quasilpv.trajectory"), "schema", "expected 'quasilpv.artifact'"),
-        (at("schema_version", value=2), "schema_version", "got 2, expected 1"),
+        (at("schema_version", value=3), "schema_version", "got 3, expected 1 or 2"),
         (without("schema_version"), "schema_version", "got nothing"),
         (at("units", value="imperial"), "units", "expected 'SI'"),
         (at("design_hash", value="5F" * 32), "design_hash", "expected text matching"),

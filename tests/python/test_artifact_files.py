@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quasilpv.artifact import Artifact, read_artifact, write_artifact
-from quasilpv.artifact.canonical import canonical_cbor, canonical_json, parse_document, with_hash
+from quasilpv.documents.canonical import canonical_cbor, canonical_json, parse_document, with_hash
 from quasilpv.errors import InputError
 from reference.artifacts import LAWS, arm3_document
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from quasilpv.artifact import Artifact, evaluate
-from quasilpv.artifact.canonical import canonical_cbor, parse_document
-from quasilpv.artifact.tables import PolytopeTable
+from quasilpv.documents.canonical import canonical_cbor, parse_document
+from quasilpv.documents.tables import PolytopeTable
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.registry import robot
 from reference.artifacts import SCHEDULE_GAINS, Change, arm3_document, at, refusal, schedule_table, without

@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from quasilpv import _runtime
-from quasilpv.artifact.canonical import canonical_cbor, canonical_json, parse_document, with_hash
+from quasilpv.documents.canonical import canonical_cbor, canonical_json, parse_document, with_hash
 from quasilpv.errors import InputError, PlantError
 from quasilpv.scenarios import build_scenario
 from quasilpv.systems.robots.registry import robot

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quasilpv.artifact.canonical import (
+from quasilpv.documents.canonical import (
     MAX_DEPTH,
     canonical_cbor,
     canonical_json,

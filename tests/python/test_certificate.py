@@ -17,12 +17,12 @@ from flint import fmpq, fmpq_mat
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from quasilpv.artifact.canonical import canonical_json, with_hash
 from quasilpv.certificate import verify
 from quasilpv.certificate.claims import Claim
 from quasilpv.certificate.exact_matrices import is_positive_definite, matrix, rational, scaled_to_unit_diagonal
 from quasilpv.certificate.vertex_tables import VertexTable
 from quasilpv.cli import run
+from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import InputError
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release

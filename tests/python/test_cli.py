@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from quasilpv.artifact import Artifact, read_artifact, write_artifact
-from quasilpv.artifact.canonical import canonical_json, parse_document, with_hash
 from quasilpv.cli import run
 from quasilpv.cli.verbs import VERBS
+from quasilpv.documents.canonical import canonical_json, parse_document, with_hash
 from quasilpv.errors import ClaimError, FaultStop, InfeasibleError, PlantError, QuasilpvError
 from quasilpv.experiments.result import Variant
 from quasilpv.release import release

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quasilpv.artifact.canonical import canonical_json, with_hash
 from quasilpv.certificate import verify
 from quasilpv.certificate.design_model import check_design_model
 from quasilpv.cli import run
+from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import InputError
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import to_artifact

@@ -17,13 +17,13 @@ from hypothesis import strategies as st
 
 import quasilpv
 from quasilpv.artifact import read_artifact
-from quasilpv.artifact.canonical import canonical_json, with_hash
 from quasilpv.certificate import CHECKERS, Evidence, gate, stabilisation_model, verify
 from quasilpv.certificate.claims import Claim, Verification, all_positive
 from quasilpv.certificate.equations_of_motion import EquationsOfMotion
 from quasilpv.certificate.exact_matrices import matrix
 from quasilpv.certificate.trigonometric import Polynomial, UnsupportedError
 from quasilpv.cli import run
+from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import ClaimError, InfeasibleError, InputError
 from quasilpv.release import checked_artifact, to_artifact
 from quasilpv.synthesis import CONTROLLERS, synthesise

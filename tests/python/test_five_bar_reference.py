@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from quasilpv import _runtime
-from quasilpv.scenarios import FiveBarPlant, LinkParameters, Scenario, SineTorque
+from quasilpv.documents.mechanism import LinkParameters
+from quasilpv.documents.plants import FiveBarPlant
+from quasilpv.scenarios import Scenario, SineTorque
 from reference.five_bar import FiveBar, closed_chain_acceleration
 from reference.serial_arm import Link, Sine
 

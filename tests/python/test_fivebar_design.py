@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
-from quasilpv.artifact.canonical import canonical_json
 from quasilpv.certificate import verify
 from quasilpv.certificate.exact_matrices import rational
 from quasilpv.certificate.gate import robust_gate
 from quasilpv.certificate.gate_data import loop_data
 from quasilpv.certificate.gate_margin import inertia_margin
+from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.experiments.track import TrackingExperiment
 from quasilpv.loops.frozen_loop import FrozenLoop

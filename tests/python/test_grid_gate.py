@@ -15,11 +15,11 @@ import pytest
 from flint import fmpq
 
 from quasilpv.artifact import Artifact, write_artifact
-from quasilpv.artifact.canonical import canonical_json, with_hash
 from quasilpv.certificate import gate
 from quasilpv.certificate.grid_gate import GridGate, frozen_torque_law, grid_gate, growth_curves
 from quasilpv.certificate.vertex_tables import VertexTable
 from quasilpv.cli import run
+from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import InputError
 from quasilpv.figures.growth import growth_figure
 from quasilpv.polytopes import BlockPolytope

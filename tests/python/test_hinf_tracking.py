@@ -14,12 +14,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from quasilpv.artifact.canonical import canonical_json, with_hash
 from quasilpv.certificate import CHECKERS, gate, verify
 from quasilpv.certificate.grid_gate import frozen_hinf_law
 from quasilpv.certificate.hinf_law import unknown_terms
 from quasilpv.conditions.tracking.iii10 import tracking_condition
 from quasilpv.conditions.tracking.iii10_reduced import UnknownTorques, reduced_tracking_condition
+from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import InfeasibleError
 from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.polytopes import BlockPolytope

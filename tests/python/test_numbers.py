@@ -12,7 +12,7 @@ import pytest
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
-from quasilpv.artifact.canonical import canonical_json, parse_strict_json, with_hash
+from quasilpv.documents.canonical import canonical_json, parse_strict_json, with_hash
 from quasilpv.errors import InputError
 from quasilpv.scenarios import Rk4Integrator, Scenario, SineTorque, build_scenario
 from quasilpv.systems.robots.registry import robot

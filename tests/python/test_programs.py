@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from quasilpv.artifact.compilation import compile_program
-from quasilpv.artifact.programs import MAX_LENGTH, MAX_STACK, OPERATIONS, Program, evaluate
+from quasilpv.documents.programs import MAX_LENGTH, MAX_STACK, OPERATIONS, Program, evaluate
 from quasilpv.errors import InputError
 
 THETA = sp.symbols("theta_1:4", real=True)

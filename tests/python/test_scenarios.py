@@ -12,20 +12,18 @@ import pytest
 
 from quasilpv import _runtime
 from quasilpv.artifact import write_artifact
-from quasilpv.artifact.canonical import canonical_json, parse_strict_json
+from quasilpv.documents.canonical import canonical_json, parse_strict_json
+from quasilpv.documents.mechanism import LinkParameters
+from quasilpv.documents.plants import FiveBarPlant, SerialArmPlant, SpringDiscPlant
 from quasilpv.errors import InputError
 from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.release import release
 from quasilpv.scenarios import (
     OPTIONAL,
-    FiveBarPlant,
     IdaIntegrator,
-    LinkParameters,
     Rk4Integrator,
     Scenario,
     Sensors,
-    SerialArmPlant,
-    SpringDiscPlant,
     build_scenario,
     read_scenario,
     tracking_task,

@@ -15,10 +15,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quasilpv.artifact.canonical import canonical_json
 from quasilpv.cli import run
 from quasilpv.conditions.tracking.iv11_reduced import feedback_condition, observer_condition
 from quasilpv.conditions.tracking.sampled_chains import feedback_gains, observer_gains
+from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.lmi import Problem, SdpaProgram, Solution, Variable, block, he
 from quasilpv.lmi.assembly import unpack

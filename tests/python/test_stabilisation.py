@@ -15,9 +15,9 @@ import scipy.integrate
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact, evaluate
-from quasilpv.artifact.canonical import canonical_json
 from quasilpv.certificate import gate, verify
 from quasilpv.certificate.robot_dynamics import gravity_stiffness, robot_dynamics
+from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.experiments.track import TrackingExperiment
 from quasilpv.loops.frozen_loop import FrozenLoop

@@ -12,7 +12,7 @@ import pytest
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
-from quasilpv.artifact.canonical import canonical_cbor, canonical_json
+from quasilpv.documents.canonical import canonical_cbor, canonical_json
 from quasilpv.errors import InfeasibleError
 from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.loops.frozen_loop import FrozenLoop

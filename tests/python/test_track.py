@@ -13,8 +13,8 @@ import pytest
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
-from quasilpv.artifact.canonical import canonical_json
 from quasilpv.certificate import verify
+from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import ClaimError, InfeasibleError, InputError
 from quasilpv.experiments import designs
 from quasilpv.experiments.disturbance import true_disturbance

@@ -12,7 +12,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quasilpv.artifact.canonical import canonical_json, with_hash
+from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.arm_parameters import OperatingDomain
 from quasilpv.systems.robots.registry import robot

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from quasilpv import _runtime
-from quasilpv.artifact.canonical import canonical_json
+from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.tree import KinematicTree
 from reference.random_trees import coordinates, pinocchio_tree, random_tree
@@ -17,23 +17,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def document(tree: KinematicTree) -> dict:
-    return {
-        "gravity_m_s2": tree.gravity_m_s2.tolist(),
-        "joints": [
-            {
-                "name": joint.name,
-                "kind": joint.kind.value,
-                "rotation": joint.placement.rotation.tolist(),
-                "translation_m": joint.placement.translation_m.tolist(),
-                "axis": joint.axis.tolist(),
-                "mass_kg": joint.inertia.mass_kg,
-                "first_moment_kg_m": joint.inertia.first_moment_kg_m.tolist(),
-                "rotational_kg_m2": joint.inertia.rotational_kg_m2.tolist(),
-                "rotor_inertia_kg_m2": joint.rotor_inertia_kg_m2,
-            }
-            for joint in tree.joints
-        ],
-    }
+    return tree.parameters_document()
 
 
 @given(seeds, st.integers(1, 7))
@@ -74,7 +58,7 @@ def test_energy_changes_by_the_power_of_the_torque(seed: int, n: int) -> None:
 
 
 def scenario(tree: KinematicTree, friction: float) -> _runtime.Scenario:
-    plant = {"kind": "tree", "label": "drawn", **document(tree)}
+    plant = {"label": "drawn", **document(tree)}
     for joint in plant["joints"]:
         joint |= {"friction_viscous_nm_s": friction, "friction_coulomb_nm": friction, "coulomb_speed_rad_s": 0.05}
     n = tree.order

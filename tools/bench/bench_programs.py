@@ -16,13 +16,13 @@ import numpy as np
 from bench_report import REPETITIONS, ROOT
 
 from quasilpv.artifact import write_artifact
+from quasilpv.documents.mechanism import LinkParameters
+from quasilpv.documents.plants import FiveBarPlant
 from quasilpv.errors import InputError, QuasilpvError
 from quasilpv.experiments.designs import kept_design
 from quasilpv.scenarios import (
-    FiveBarPlant,
     IdaIntegrator,
     InitialState,
-    LinkParameters,
     Scenario,
     Sensors,
     SineTorque,

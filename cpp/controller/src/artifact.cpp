@@ -292,7 +292,7 @@ Artifact Artifact::parse(std::string_view bytes, const std::string& source) {
 
 void Artifact::parse_header(const Field& root) {
   root["schema"].expect_text("quasilpv.artifact");
-  root["schema_version"].integer(1, 1);
+  root["schema_version"].integer(1, 2);
   root.only({"schema", "schema_version", "hash", "name", "creator", "design_hash", "units", "sample_period_s", "joints",
              "robot", "payloads", "domain", "limits", "programs", "law", "witness", "verification"});
   hash_ = root["hash"].text();

@@ -29,8 +29,8 @@ from matplotlib.figure import Figure
 
 from quasilpv import certificate
 from quasilpv.artifact import Artifact, read_artifact
-from quasilpv.artifact.canonical import parse_document, parse_strict_json
 from quasilpv.certificate import Evidence, Gate, Verification
+from quasilpv.documents.canonical import parse_document, parse_strict_json
 from quasilpv.errors import InputError, one_of
 from quasilpv.experiments.metrics import Metrics
 from quasilpv.experiments.result import TrackResult

@@ -15,9 +15,10 @@ from flint import fmpq
 
 from quasilpv import __version__
 from quasilpv.artifact import Artifact, Program
-from quasilpv.artifact.canonical import document_hash
 from quasilpv.artifact.compilation import compile_program
 from quasilpv.certificate import CHECKERS, Evidence, gate, verify
+from quasilpv.documents.canonical import document_hash
+from quasilpv.documents.robot import ARTIFACT_VERSION
 from quasilpv.errors import ClaimError
 from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, synthesise, without_compensation
 from quasilpv.synthesis.actuator_demand import MotionsOf, no_motions, unmet_demands
@@ -166,7 +167,7 @@ def to_artifact(design: TrackingDesign) -> Artifact:
     return Artifact.from_document(
         {
             "schema": "quasilpv.artifact",
-            "schema_version": 1,
+            "schema_version": ARTIFACT_VERSION,
             "name": f"{source.id}-{design.controller}-{rate:g}hz",
             "creator": {"tool": "quasilpv", "version": __version__},
             "design_hash": document_hash(design_inputs(source, design.inputs)),

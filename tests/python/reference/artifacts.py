@@ -105,7 +105,7 @@ def arm3_document(kind: str = "dob-acceleration") -> dict[str, Any]:
         law["observer"] = polytope.to_document(np.concatenate([vertices.swapaxes(1, 2), vertices[:, :, :3]], axis=1))
     document = {
         "schema": "quasilpv.artifact",
-        "schema_version": 1,
+        "schema_version": 2,
         "name": f"arm3-{kind}-1000hz",
         "creator": {"tool": "design", "version": "0.1.0"},
         "design_hash": "5f" * 32,

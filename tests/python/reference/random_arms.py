@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from quasilpv.artifact.canonical import canonical_json, with_hash
 from quasilpv.artifact.compilation import compile_program
+from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.systems.descriptor.premise import AffineMatrix
 from quasilpv.systems.robots.arm_parameters import Link as ArmLink
@@ -44,7 +44,7 @@ def artifact_document(
     return with_hash(
         {
             "schema": "quasilpv.artifact",
-            "schema_version": 1,
+            "schema_version": 2,
             "name": f"random-{law['kind']}",
             "creator": {"tool": "tests", "version": "1"},
             "design_hash": "0" * 64,

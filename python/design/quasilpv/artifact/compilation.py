@@ -9,7 +9,7 @@ import numpy as np
 import sympy
 from sympy.core.sorting import default_sort_key
 
-from quasilpv.artifact.programs import MAX_LENGTH, MAX_POWER, MAX_STACK, OPERATIONS, Program
+from quasilpv.documents.programs import MAX_LENGTH, MAX_POWER, MAX_STACK, OPERATIONS, Program
 from quasilpv.errors import InputError
 
 Instruction = tuple[str] | tuple[str, int] | tuple[str, float]

@@ -6,8 +6,9 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from quasilpv.artifact.strict_model import FieldError, NonNegative, Number, Positive, StrictModel
-from quasilpv.artifact.tables import Matrix, PolytopeTable, Vector, require_lyapunov, require_shape, require_size
+from quasilpv.documents.design_inertia import DesignInertia
+from quasilpv.documents.strict_model import FieldError, NonNegative, Number, Positive, StrictModel
+from quasilpv.documents.tables import Matrix, PolytopeTable, Vector, require_lyapunov, require_shape, require_size
 
 MIN_WINDOW_SAMPLES = 5
 """A shorter moving window has no mean to speak of; 0 stands for its limit."""
@@ -28,21 +29,34 @@ class Feedback(StrictModel):
 
 
 class _Law(StrictModel):
-    """What every law has: the design inertia, scheduled on the premises of the program ``premises``."""
+    """What every law has: the design inertia, a table over the premises of the program ``premises`` or a robot."""
 
-    inertia: PolytopeTable
+    inertia: DesignInertia
 
     def check(self, joints: int) -> None:
         """Raise ``FieldError`` unless gains and tables fit a robot of n joints."""
 
     def premises_of(self, program: str) -> int | None:
         """How many premises a program of this law has to compute; None for a program of torques."""
-        return self.inertia.premises if program == "premises" else None
+        inertia = self.inertia
+        return inertia.premises if program == "premises" and isinstance(inertia, PolytopeTable) else None
+
+    @property
+    def premise_box(self) -> tuple[Vector, Vector]:
+        """Lower and upper bounds the premises of the inertia are clamped to; a robot has no premises."""
+        inertia = self.inertia
+        return (inertia.lower, inertia.upper) if isinstance(inertia, PolytopeTable) else ((), ())
+
+    @property
+    def reads_programs(self) -> bool:
+        """Whether premises and gravity are programs; a robot as design inertia has its own."""
+        return isinstance(self.inertia, PolytopeTable)
 
 
 class _VelocityLaw(_Law):
     """A law that reads measured speeds through a low-pass filter."""
 
+    inertia: PolytopeTable
     velocity_filter_time_constant_s: NonNegative
 
 
@@ -120,6 +134,7 @@ class DobTorqueLaw(_OptionalMemberLaw):
     optional: ClassVar[tuple[str, str]] = ("premultiplication", "a block polytope")
 
     kind: Literal["dob-torque"]
+    inertia: PolytopeTable
     feedback: PolytopeTable
     observer: PolytopeTable
     filter_time_constant_s: Positive

@@ -11,11 +11,15 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.canonical import Document, document_hash, with_hash
 from quasilpv.artifact.laws import Law
-from quasilpv.artifact.programs import MAX_JOINTS, Program
-from quasilpv.artifact.strict_model import FieldError, Number, Positive, StrictModel, validate
-from quasilpv.artifact.tables import require_size
+from quasilpv.documents.canonical import Document, document_hash, with_hash
+from quasilpv.documents.design_inertia import DESIGN_INERTIA_TAGS
+from quasilpv.documents.mechanism import Mechanism
+from quasilpv.documents.programs import MAX_JOINTS, Program
+from quasilpv.documents.robot import read_mechanism
+from quasilpv.documents.strict_model import FieldError, Number, Positive, StrictModel, validate
+from quasilpv.documents.tables import PolytopeTable, require_size
+from quasilpv.errors import InputError
 
 Interval = tuple[Number, Number]
 LARGEST_TORQUE_NM = 1e12
@@ -88,7 +92,7 @@ class Artifact(StrictModel):
     """
 
     schema_: Literal["quasilpv.artifact"] = Field(alias="schema")
-    schema_version: Literal[1]
+    schema_version: Literal[1, 2]
     name: Name
     creator: Creator
     design_hash: Sha256
@@ -103,6 +107,26 @@ class Artifact(StrictModel):
     law: Law
     witness: dict[str, Any] | None
     verification: dict[str, Any] | None
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The nominal robot, typed.
+
+        Raises:
+            InputError: ``robot.parameters``, which nothing reads at run time, are those of no kind known here.
+        """
+        return read_mechanism(self.robot.parameters, self.schema_version, self.name)
+
+    @property
+    def inertia_table(self) -> PolytopeTable:
+        """The design inertia of a law that has a table.
+
+        Raises:
+            InputError: it has the robot itself.
+        """
+        if isinstance(self.law.inertia, PolytopeTable):
+            return self.law.inertia
+        raise InputError(self.name, "law.inertia", f"a robot of kind {self.law.inertia.kind}", "a table")
 
     @property
     def hash(self) -> str:
@@ -140,7 +164,7 @@ class Artifact(StrictModel):
             InputError: a rule of the format is broken; the message names the field.
         """
         content = {key: value for key, value in document.items() if key != "hash"}
-        return validate(cls, content, source, tags=REQUIRED_PROGRAMS)
+        return validate(cls, content, source, tags=(*REQUIRED_PROGRAMS, *DESIGN_INERTIA_TAGS))
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Self:
@@ -148,13 +172,16 @@ class Artifact(StrictModel):
         for field in ("domain.angle_rad", "domain.speed_rad_s", "limits.torque_nm", "limits.slew_nm_per_s"):
             section, member = field.split(".")
             require_size(field, getattr(getattr(self, section), member), n)
-        self.law.inertia.require_inertia("law.inertia", n)
+        if isinstance(self.law.inertia, PolytopeTable):
+            self.law.inertia.require_inertia("law.inertia", n)
+        elif self.law.inertia.joints != n:
+            raise FieldError("law.inertia.joints", f"{self.law.inertia.joints} entries", str(n))
         self.law.check(n)
         self._check_programs()
         return self
 
     def _check_programs(self) -> None:
-        required = REQUIRED_PROGRAMS[self.law.kind]
+        required = REQUIRED_PROGRAMS[self.law.kind] if self.law.reads_programs else ()
         if set(self.programs) != set(required):
             raise FieldError("programs", sorted(self.programs), f"{sorted(required)} for kind {self.law.kind}")
         for name in required:

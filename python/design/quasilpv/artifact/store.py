@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from quasilpv.artifact.canonical import canonical_cbor, canonical_json, member_path, parse_document
 from quasilpv.artifact.envelope import envelope_summary
 from quasilpv.artifact.schema import Artifact
+from quasilpv.documents.canonical import canonical_cbor, canonical_json, member_path, parse_document
+from quasilpv.documents.mechanism import Tree
+from quasilpv.documents.tables import PolytopeTable
 from quasilpv.files import read_bytes, write_atomically
 
 JSON_NAME = "artifact.json"
@@ -59,7 +61,6 @@ def diff(left: Artifact, right: Artifact) -> list[Difference]:
 def summary(artifact: Artifact) -> dict[str, Any]:
     """Return what ``design inspect`` prints: identity, sizes, law and the results of checks, as a JSON-able tree."""
     law = artifact.law
-    inertia = law.inertia
     tables = {"kind", "inertia"}
     return {
         "name": artifact.name,
@@ -71,15 +72,24 @@ def summary(artifact: Artifact) -> dict[str, Any]:
         "sample_period_s": artifact.sample_period_s,
         "law": law.kind,
         "gains": {key: value for key, value in law.model_dump(mode="json").items() if key not in tables},
-        "premises": inertia.premises,
-        "blocks": [len(block.premises) for block in inertia.blocks],
-        "vertices": sum(len(block.vertices) for block in inertia.blocks),
+        **_inertia_summary(law.inertia),
         "programs": {name: len(program.code) for name, program in sorted(artifact.programs.items())},
         "torque_limit_nm": list(artifact.limits.torque_nm),
         "slew_limit_nm_per_s": list(artifact.limits.slew_nm_per_s),
         "witness": artifact.witness is not None,
         "envelope": envelope_summary(artifact),
         "verification": artifact.verification,
+    }
+
+
+def _inertia_summary(inertia: PolytopeTable | Tree) -> dict[str, Any]:
+    """Sizes of a table; of a robot, its kind and its joints."""
+    if isinstance(inertia, Tree):
+        return {"design_inertia": inertia.kind, "bodies": inertia.joints}
+    return {
+        "premises": inertia.premises,
+        "blocks": [len(block.premises) for block in inertia.blocks],
+        "vertices": inertia.vertex_count,
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -91,6 +92,23 @@ class SpatialRobot:
     delay_s: Interval
     lag_s: Interval
     source: str
+
+    def payloads_document(self) -> dict[str, Any]:
+        """The member ``payloads`` of an artifact: all robots between `lightest` and `heaviest`."""
+        tool, load = self.tree.tool, self.payload
+        return {
+            "link_tolerance": self.link_uncertainty,
+            "rotor_tolerance": [joint.rotor_tolerance for joint in self.joints],
+            "load": None
+            if load is None
+            else {
+                "rotation": tool.rotation.tolist(),
+                "translation_m": tool.translation_m.tolist(),
+                "mass_kg": load.mass_kg,
+                "com_box_m": [list(interval) for interval in load.com_box_m],
+                "inertia_kg_m2": list(load.inertia_kg_m2),
+            },
+        }
 
     def lightest(self) -> KinematicTree:
         """The robot with the least inertia: empty, all links and rotors at the lower end."""

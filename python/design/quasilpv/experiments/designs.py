@@ -8,8 +8,8 @@ from pathlib import Path
 
 import quasilpv
 from quasilpv.artifact import Artifact, read_artifact, write_artifact
-from quasilpv.artifact.canonical import document_hash
 from quasilpv.artifact.store import JSON_NAME
+from quasilpv.documents.canonical import document_hash
 from quasilpv.errors import InputError
 from quasilpv.files import forget_input
 from quasilpv.release import checked_artifact, design_inputs

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from quasilpv.documents.mechanism import LinkParameters
+from quasilpv.documents.plants import FiveBarPlant, Plant, SerialArmPlant, SpringDiscPlant
 from quasilpv.errors import InputError
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import Run
 from quasilpv.experiments.track import run_from_columns, summarise_as
-from quasilpv.scenarios import FiveBarPlant, LinkParameters, Plant, SerialArmPlant
 from quasilpv.systems.robots.arm_parameters import Link
 from quasilpv.systems.robots.arms import PlanarSerialArm
 from quasilpv.systems.robots.fivebar import RhombicFiveBar
@@ -60,7 +61,7 @@ def mechanism_of(plant: Plant) -> PlanarMechanism:
     """The mechanism that the ``plant`` member of a scenario describes.
 
     Raises:
-        InputError: a five-bar with links of two lengths, which are simulated but not designed for.
+        InputError: a five-bar with links of two lengths, which are simulated but not designed for, or a robot in space.
     """
     name = plant.kind
     if isinstance(plant, SerialArmPlant):
@@ -69,7 +70,9 @@ def mechanism_of(plant: Plant) -> PlanarMechanism:
         return replace(arm, equilibrium="upright") if plant.gravity_m_s2 < 0.0 else arm
     if isinstance(plant, FiveBarPlant):
         return RhombicFiveBar(FiveBarLinkage(name, _link(plant.active), _link(plant.passive), plant.gravity_m_s2))
-    return RollingDisc(name, **plant.model_dump(exclude={"kind", "label"}))
+    if isinstance(plant, SpringDiscPlant):
+        return RollingDisc(name, **plant.model_dump(exclude={"kind", "label"}))
+    raise InputError("scenario", "plant.kind", name, "a mechanism in a plane, which is what can be drawn")
 
 
 def _link(link: LinkParameters) -> Link:

@@ -15,7 +15,7 @@ import numpy as np
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
-from quasilpv.artifact.canonical import canonical_json
+from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import ClaimError
 from quasilpv.experiments.run import FloatArray
 from quasilpv.scenarios import Scenario
@@ -187,7 +187,7 @@ def joining_speed(artifact: Artifact, offset: FloatArray, speed: FloatArray) -> 
         offset: of the arm from the reference, (n,), rad.
         speed: of that offset, (n,), rad/s.
     """
-    inertia = artifact.law.inertia
+    inertia = artifact.inertia_table
     vertices = np.array([vertex for block in inertia.blocks for vertex in block.vertices])
     acceleration = np.min(np.array(artifact.limits.torque_nm) / np.abs(vertices).sum(axis=2).max(axis=0))
     fastest = np.abs(artifact.domain.speed_rad_s).max(axis=1)

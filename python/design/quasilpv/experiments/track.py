@@ -11,8 +11,9 @@ import numpy as np
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact, write_artifact
-from quasilpv.artifact.canonical import canonical_json
 from quasilpv.artifact.envelope import OperatingEnvelope
+from quasilpv.documents.canonical import canonical_json
+from quasilpv.documents.robot import read_mechanism
 from quasilpv.errors import InputError
 from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.metrics import compute_metrics
@@ -94,11 +95,12 @@ def robot_of(artifact: Artifact) -> Robot:
     if source is None:
         expected = f"one of the registry, {', '.join(known)}, or the robot itself beside the artifact"
         raise InputError(artifact.name, "robot.id", artifact.robot.id, expected)
-    for field, shipped, own in (
-        ("robot.parameters", artifact.robot.parameters, source.model.parameters_document()),
-        ("payloads", artifact.payloads, source.payloads.to_document()),
+    own = read_mechanism(source.model.parameters_document(), source=source.id)
+    for field, same in (
+        ("robot.parameters", artifact.mechanism == own),
+        ("payloads", canonical_json(artifact.payloads) == canonical_json(source.payloads.to_document())),
     ):
-        if canonical_json(shipped) != canonical_json(own):
+        if not same:
             expected = f"those of {source.id} in the registry, or the robot itself beside the artifact"
             raise InputError(artifact.name, field, "others", expected)
     return source

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from quasilpv import _runtime
-from quasilpv.artifact.canonical import canonical_json
+from quasilpv.documents.canonical import canonical_json
 from quasilpv.experiments.run import FloatArray
 from quasilpv.experiments.track import TrackingExperiment
 from quasilpv.reproduction.closed_loops import Outcome

@@ -8,7 +8,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.canonical import (
+from quasilpv.defaults import ENCODER_BITS
+from quasilpv.documents.canonical import (
     MAX_SAFE_INTEGER,
     Document,
     member_path,
@@ -16,9 +17,9 @@ from quasilpv.artifact.canonical import (
     parse_strict_json,
     require_bounded,
 )
-from quasilpv.artifact.programs import MAX_JOINTS
-from quasilpv.artifact.strict_model import LARGEST_NUMBER, FieldError, NonNegative, Positive, StrictModel, validate
-from quasilpv.defaults import ENCODER_BITS
+from quasilpv.documents.mechanism import MECHANISM_KINDS
+from quasilpv.documents.plants import Plant
+from quasilpv.documents.strict_model import LARGEST_NUMBER, FieldError, NonNegative, Positive, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import read_bytes, write_readable_json
 
@@ -31,125 +32,6 @@ NOISE_SEED = 20220315
 """Seed of the speed noise in every scenario of the registry: fixed, so that two runs see the same noise."""
 
 VELOCITY_NOISE_RAD_S = 0.05
-
-
-class LinkParameters(StrictModel):
-    """One link; the moment of inertia is about its joint axis."""
-
-    length_m: Positive
-    mass_kg: Positive
-    com_m: float
-    inertia_kg_m2: Positive
-    friction_nm_s: NonNegative
-
-    @model_validator(mode="after")
-    def _check_inertia(self) -> Self:
-        least = self.mass_kg * self.com_m**2
-        if self.inertia_kg_m2 < least * (1.0 - 1e-12):
-            expected = f"at least mass_kg * com_m^2 = {least:.6g}, being about the joint axis"
-            raise FieldError("inertia_kg_m2", self.inertia_kg_m2, expected)
-        return self
-
-
-class SerialArmPlant(StrictModel):
-    """A planar serial arm that hangs at theta = 0."""
-
-    kind: Literal["serial-arm"]
-    label: str
-    gravity_m_s2: float
-    links: Annotated[tuple[LinkParameters, ...], Field(min_length=1, max_length=MAX_JOINTS)]
-
-    @property
-    def joints(self) -> int:
-        """Actuated and measured joints."""
-        return len(self.links)
-
-
-class FiveBarPlant(StrictModel):
-    """A planar five-bar: two equal legs, each an active link on the motor axis and a passive one to the tool.
-
-    Attributes:
-        active: link that a motor drives; its friction is that of the motor axis.
-        passive: link from the elbow to the tool; its friction is that of the elbow.
-        spring_nm_rad: stiffness of the torsion springs on the motor axis, relaxed at ``spring_rest_rad``.
-        formulation: ``index1``, or ``ggl`` for the stabilised index-2 form.
-        baumgarte_per_s: rate at which constraint errors decay in the form of index 1.
-    """
-
-    kind: Literal["five-bar"] = "five-bar"
-    label: str
-    gravity_m_s2: float
-    active: LinkParameters
-    passive: LinkParameters
-    spring_nm_rad: NonNegative = 0.0
-    spring_rest_rad: tuple[float, float] = (0.0, 0.0)
-    formulation: Literal["index1", "ggl"] = "index1"
-    baumgarte_per_s: NonNegative = 50.0
-
-    @property
-    def joints(self) -> int:
-        """Actuated and measured joints."""
-        return 2
-
-
-class SpringDiscPlant(StrictModel):
-    """A disc that rolls without slipping, held by a damper and a hardening spring; its joint is its own rotation."""
-
-    kind: Literal["spring-disc"] = "spring-disc"
-    label: str
-    mass_kg: Positive
-    radius_m: Positive
-    inertia_kg_m2: Positive
-    inertia_uncertainty_per_kg: NonNegative
-    stiffness_n_m: NonNegative
-    cubic_stiffness_n_m3: NonNegative
-    damping_n_s_m: NonNegative
-
-    @property
-    def joints(self) -> int:
-        """Actuated and measured joints."""
-        return 1
-
-
-Row = tuple[float, float, float]
-
-
-class TreeJoint(StrictModel):
-    """One joint of a robot in space and the body it carries; the inertia is about the joint's frame.
-
-    Attributes:
-        rotation, translation_m: of the joint's frame at coordinate 0 in the frame before; rows of the rotation.
-        rotor_inertia_kg_m2: reflected to the joint.
-        coulomb_speed_rad_s: speed w0 in the friction torque ``viscous w + coulomb tanh(w / w0)``.
-    """
-
-    name: str
-    kind: Literal["revolute", "continuous", "prismatic"]
-    rotation: tuple[Row, Row, Row]
-    translation_m: Row
-    axis: Row
-    mass_kg: NonNegative
-    first_moment_kg_m: Row
-    rotational_kg_m2: tuple[Row, Row, Row]
-    rotor_inertia_kg_m2: NonNegative
-    friction_viscous_nm_s: NonNegative
-    friction_coulomb_nm: NonNegative
-    coulomb_speed_rad_s: Positive
-
-
-class TreePlant(StrictModel):
-    """A robot in space, its payload merged into its last body; gravity in the axes of the base."""
-
-    kind: Literal["tree"] = "tree"
-    label: str
-    gravity_m_s2: Row
-    # Whether rotations are rotations and bodies have positive energy, the simulator decides.
-    chain: Annotated[tuple[TreeJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
-
-    @property
-    def joints(self) -> int:
-        """Actuated and measured joints."""
-        return len(self.chain)
 
 
 class IdaIntegrator(StrictModel):
@@ -192,10 +74,9 @@ class InitialState(StrictModel):
     speed_rad_s: Vector
 
 
-Plant = Annotated[SerialArmPlant | FiveBarPlant | SpringDiscPlant | TreePlant, Field(discriminator="kind")]
 Integrator = Annotated[IdaIntegrator | Rk4Integrator, Field(discriminator="kind")]
 
-TAGS = ("serial-arm", "five-bar", "spring-disc", "tree", "ida", "rk4")
+TAGS = (*MECHANISM_KINDS, "ida", "rk4")
 """The kinds that tell the cases of a union apart."""
 
 

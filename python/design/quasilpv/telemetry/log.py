@@ -20,9 +20,9 @@ import numpy.typing as npt
 from pydantic import Field
 
 from quasilpv.artifact import Artifact
-from quasilpv.artifact.canonical import canonical_json, parse_document, parse_strict_json
-from quasilpv.artifact.strict_model import StrictModel, validate
 from quasilpv.defaults import LAST
+from quasilpv.documents.canonical import canonical_json, parse_document, parse_strict_json
+from quasilpv.documents.strict_model import StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import write_atomically
 from quasilpv.scenarios import Scenario

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
-from quasilpv.artifact.canonical import canonical_json
+from quasilpv.documents.canonical import canonical_json
 from quasilpv.scenarios import Scenario
 from quasilpv.telemetry.codes import CONTROLLER, ENDED, PLANT, RUNNING, STARTED
 from quasilpv.telemetry.event_log import Event, write_events
@@ -169,7 +169,7 @@ def _run_event(artifact: Artifact, source: int, code: int, utime: int, seq: int)
 def _premises(artifact: Artifact, angle: FloatArray) -> FloatArray:
     """The premises of every sample as the step reads them: of the measured angles, clamped to their box."""
     runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()), artifact.name)
-    table = artifact.law.inertia
+    lower, upper = artifact.law.premise_box
     values = np.array([runtime.premises(row) for row in angle.reshape(-1, artifact.joints)])
-    clamped: FloatArray = np.clip(values.reshape(len(values), table.premises), table.lower, table.upper)
+    clamped: FloatArray = np.clip(values.reshape(len(values), len(lower)), lower, upper)
     return clamped

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv import _runtime
-from quasilpv.artifact.canonical import canonical_json
+from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.telemetry.codes import FAULT
 from quasilpv.telemetry.log import RunLog

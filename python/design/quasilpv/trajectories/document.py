@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.canonical import (
+from quasilpv.documents.canonical import (
     Document,
     canonical_cbor,
     canonical_json,
@@ -20,8 +20,8 @@ from quasilpv.artifact.canonical import (
     parse_document,
     with_hash,
 )
-from quasilpv.artifact.programs import MAX_JOINTS
-from quasilpv.artifact.strict_model import FieldError, Number, StrictModel, validate
+from quasilpv.documents.programs import MAX_JOINTS
+from quasilpv.documents.strict_model import FieldError, Number, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import read_bytes, write_atomically
 from quasilpv.trajectories.quintics import least_jerk, quintic_hermite

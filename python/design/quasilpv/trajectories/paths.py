@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.canonical import parse_strict_json, require_bounded
-from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
+from quasilpv.documents.canonical import parse_strict_json, require_bounded
+from quasilpv.documents.strict_model import FieldError, StrictModel, validate
 from quasilpv.files import read_bytes
 
 Array = npt.NDArray[np.float64]

@@ -17,8 +17,8 @@ from typing import Annotated, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.canonical import parse_strict_json, require_bounded
-from quasilpv.artifact.strict_model import FieldError, StrictModel, validate
+from quasilpv.documents.canonical import parse_strict_json, require_bounded
+from quasilpv.documents.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import read_bytes
 from quasilpv.systems.robots.spatial import Placement

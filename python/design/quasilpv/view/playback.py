@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
-from quasilpv.artifact.canonical import canonical_json
+from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.logged import logged_run
@@ -59,8 +59,8 @@ class Motion:
     @classmethod
     def of_telemetry(cls, records: Records, artifact: Artifact) -> Motion:
         """What telemetry alone tells, samples in order: measured angles, no true disturbance."""
-        n, table = artifact.joints, artifact.law.inertia
-        span = np.subtract(table.upper, table.lower)
+        n, (lower, upper) = artifact.joints, artifact.law.premise_box
+        span = np.subtract(upper, lower)
         return cls(
             time_s=records["seq"] * artifact.sample_period_s,
             reference_angle_rad=np.array(records["reference_angle_rad"][:, :n]),
@@ -68,7 +68,7 @@ class Motion:
             torque_nm=np.array(records["applied_torque_nm"][:, :n]),
             estimate=np.array(records["filtered_disturbance"][:, :n]),
             disturbance=np.full((records.size, n), np.nan),
-            weight=(records["premise"][:, : table.premises] - table.lower) / span,
+            weight=(records["premise"][:, : len(lower)] - np.array(lower)) / span,
             lyapunov_rad2=np.array(records["lyapunov_rad2"]),
             state=records["state"].astype(np.int64),
             flags=records["flags"].astype(np.int64),

@@ -218,8 +218,9 @@ class PlanarSerialArm(PlanarMechanism):
         return replace(self, links=tuple(links))
 
     def parameters_document(self) -> dict[str, Any]:
-        """The physical parameters as JSON-able data: gravity_m_s2, equilibrium and links."""
+        """The physical parameters as a document of kind ``serial-arm``, see `SerialArm` of the documents."""
         return {
+            "kind": "serial-arm",
             "gravity_m_s2": self.gravity_m_s2,
             "equilibrium": self.equilibrium,
             "links": [asdict(link) for link in self.links],
@@ -233,4 +234,4 @@ class PlanarSerialArm(PlanarMechanism):
         document = self.parameters_document()
         del document["equilibrium"]
         document["gravity_m_s2"] *= self.equilibrium_sign
-        return {"kind": "serial-arm", "label": label, **document}
+        return {"label": label, **document}

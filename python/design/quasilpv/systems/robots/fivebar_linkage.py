@@ -269,8 +269,9 @@ class FiveBarLinkage:
         )
 
     def parameters_document(self) -> dict[str, Any]:
-        """The physical parameters as JSON-able data: gravity_m_s2, assembly, active and passive link."""
+        """The physical parameters as a document of kind ``five-bar``, see `FiveBar` of the documents."""
         return {
+            "kind": "five-bar",
             "gravity_m_s2": self.gravity_m_s2,
             "assembly": self.assembly,
             "active": asdict(self.active),
@@ -288,7 +289,6 @@ class FiveBarLinkage:
         document = self.parameters_document()
         del document["assembly"]
         return {
-            "kind": "five-bar",
             "label": label,
             **document,
             "spring_nm_rad": 0.0,

@@ -152,14 +152,15 @@ class RollingDisc(PlanarMechanism):
         return replace(self, inertia_uncertainty_per_kg=self.inertia_uncertainty_per_kg + delta)
 
     def parameters_document(self) -> dict[str, Any]:
-        """The physical parameters of the nominal disc as JSON-able data."""
+        """The physical parameters of the nominal disc as a document of kind ``spring-disc``."""
         left_out = ("name", "inertia_uncertainty_per_kg")
-        return {name: value for name, value in asdict(self).items() if name not in left_out}
+        parameters = {name: value for name, value in asdict(self).items() if name not in left_out}
+        return {"kind": "spring-disc", **parameters}
 
     def plant_document(self, label: str) -> dict[str, Any]:
         """The ``plant`` member of a scenario file."""
         delta = {"inertia_uncertainty_per_kg": self.inertia_uncertainty_per_kg}
-        return {"kind": "spring-disc", "label": label, **self.parameters_document(), **delta}
+        return {"label": label, **self.parameters_document(), **delta}
 
 
 @dataclass(frozen=True)

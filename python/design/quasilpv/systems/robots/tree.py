@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from math import inf, isfinite, pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -171,6 +172,27 @@ class KinematicTree:
             for j in self.joints
         )
         return replace(self, joints=joints)
+
+    def parameters_document(self) -> dict[str, Any]:
+        """The physical parameters as a document of kind ``tree``, without friction, limits and tool."""
+        return {
+            "kind": "tree",
+            "gravity_m_s2": self.gravity_m_s2.tolist(),
+            "joints": [
+                {
+                    "name": joint.name,
+                    "kind": joint.kind.value,
+                    "rotation": joint.placement.rotation.tolist(),
+                    "translation_m": joint.placement.translation_m.tolist(),
+                    "axis": joint.axis.tolist(),
+                    "mass_kg": joint.inertia.mass_kg,
+                    "first_moment_kg_m": joint.inertia.first_moment_kg_m.tolist(),
+                    "rotational_kg_m2": joint.inertia.rotational_kg_m2.tolist(),
+                    "rotor_inertia_kg_m2": joint.rotor_inertia_kg_m2,
+                }
+                for joint in self.joints
+            ],
+        }
 
     # ---- kinematics ------------------------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.strict_model import LARGEST_NUMBER, FieldError, StrictModel
+from quasilpv.documents.strict_model import LARGEST_NUMBER, FieldError, StrictModel
 from quasilpv.errors import InputError
 
 MAX_STACK = 64

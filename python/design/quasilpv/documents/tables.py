@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from quasilpv.artifact.strict_model import FieldError, Number, StrictModel
+from quasilpv.documents.strict_model import FieldError, Number, StrictModel
 
 MAX_PREMISES = 32
 ROUNDING = 1e-12

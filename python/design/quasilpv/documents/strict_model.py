@@ -7,7 +7,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from quasilpv.artifact.canonical import canonical_json, member_path
+from quasilpv.documents.canonical import canonical_json, member_path
 from quasilpv.errors import InputError
 
 LARGEST_NUMBER = 1e100

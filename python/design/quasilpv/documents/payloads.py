@@ -1,0 +1,90 @@
+"""The member ``payloads`` of an artifact: the set of plants a design was gated for, one form per kind of mechanism."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from quasilpv.documents.strict_model import FieldError, NonNegative, Positive, StrictModel
+
+Interval = tuple[float, float]
+Row = tuple[float, float, float]
+Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+
+WHOLE = (0.0, 1.0)
+
+
+class PayloadsDocument(StrictModel):
+    """A set of plants; what it says and no more is what a gate proves."""
+
+    def require_joints(self, joints: int) -> None:
+        """Raise ``FieldError`` unless there is one entry for each joint where there has to be."""
+
+
+class _Fractions(PayloadsDocument):
+    """Plants along one line: fraction 0 is the nominal robot, 1 the full payload."""
+
+    fraction: Interval
+
+    @model_validator(mode="after")
+    def _check_fraction(self) -> Self:
+        if self.fraction != WHOLE:
+            raise FieldError("fraction", list(self.fraction), str(list(WHOLE)))
+        return self
+
+
+class LinkPayloads(_Fractions):
+    """Factors of masses and of distances to centres of mass at fraction 1, one per link (or kind of link)."""
+
+    mass_scale: tuple[float, ...]
+    com_scale: tuple[float, ...]
+    inertia_about_com: Literal["unchanged"]
+
+    def require_joints(self, joints: int) -> None:
+        """See `PayloadsDocument.require_joints`."""
+        for field in ("mass_scale", "com_scale"):
+            if len(getattr(self, field)) != joints:
+                raise FieldError(field, f"{len(getattr(self, field))} entries", str(joints))
+
+
+class DiscPayloads(_Fractions):
+    """Factor of the moment of inertia of a disc at fraction 1."""
+
+    inertia_scale: float
+
+
+class Load(StrictModel):
+    """All bodies the last link may carry: from nothing to the largest mass, anywhere in a box.
+
+    Attributes:
+        rotation, translation_m: of the load's frame in the frame of the last joint; rows of the rotation.
+        mass_kg: largest mass.
+        com_box_m: box of the centre of mass, in the load's frame.
+        inertia_kg_m2: bound of the moment of inertia about the centre of mass, per axis of the load's frame.
+    """
+
+    rotation: tuple[Row, Row, Row]
+    translation_m: Row
+    mass_kg: Positive
+    com_box_m: tuple[Interval, Interval, Interval]
+    inertia_kg_m2: tuple[NonNegative, NonNegative, NonNegative]
+
+
+class TreePayloads(PayloadsDocument):
+    """Robots in space around the nominal one, each difference on its own.
+
+    Attributes:
+        link_tolerance: share by which the inertia of every link may differ, up and down.
+        rotor_tolerance: the same of the rotors, one per joint.
+        load: what the robot may carry; null for nothing.
+    """
+
+    link_tolerance: Share
+    rotor_tolerance: tuple[Share, ...]
+    load: Load | None
+
+    def require_joints(self, joints: int) -> None:
+        """See `PayloadsDocument.require_joints`."""
+        if len(self.rotor_tolerance) != joints:
+            raise FieldError("rotor_tolerance", f"{len(self.rotor_tolerance)} entries", str(joints))

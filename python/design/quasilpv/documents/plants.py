@@ -1,0 +1,75 @@
+"""The true plants of scenarios: mechanisms with a label and with what only a simulation needs."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field
+
+from quasilpv.documents.mechanism import FiveBarLinks, MechanismDocument, Row, SerialLinks, SpringDisc, TreeJoint
+from quasilpv.documents.payloads import TreePayloads
+from quasilpv.documents.programs import MAX_JOINTS
+from quasilpv.documents.strict_model import NonNegative, Positive, StrictModel
+
+
+class _Labelled(StrictModel):
+    """What every plant has."""
+
+    label: str
+
+
+class SerialArmPlant(SerialLinks, _Labelled):
+    """A planar serial arm that hangs at theta = 0."""
+
+
+class FiveBarPlant(FiveBarLinks, _Labelled):
+    """A planar five-bar, assembled with its tool on the far side of the elbows.
+
+    Attributes:
+        spring_nm_rad: stiffness of the torsion springs on the motor axis, relaxed at ``spring_rest_rad``.
+        formulation: ``index1``, or ``ggl`` for the stabilised index-2 form.
+        baumgarte_per_s: rate at which constraint errors decay in the form of index 1.
+    """
+
+    spring_nm_rad: NonNegative = 0.0
+    spring_rest_rad: tuple[float, float] = (0.0, 0.0)
+    formulation: Literal["index1", "ggl"] = "index1"
+    baumgarte_per_s: NonNegative = 50.0
+
+
+class SpringDiscPlant(SpringDisc, _Labelled):
+    """A rolling disc with a moment of inertia of its own: 1/J_delta = 1/J + delta / r^2."""
+
+    inertia_uncertainty_per_kg: NonNegative
+
+
+class RubbingJoint(TreeJoint):
+    """A joint with friction.
+
+    Attributes:
+        coulomb_speed_rad_s: speed w0 in the friction torque ``viscous w + coulomb tanh(w / w0)``.
+    """
+
+    friction_viscous_nm_s: NonNegative
+    friction_coulomb_nm: NonNegative
+    coulomb_speed_rad_s: Positive
+
+
+class TreePlant(MechanismDocument, _Labelled):
+    """A robot in space, its payload merged into its last body; gravity in the axes of the base."""
+
+    PAYLOADS = TreePayloads
+
+    kind: Literal["tree"] = "tree"
+    gravity_m_s2: Row
+    # Whether rotations are rotations and bodies have positive energy, the simulator decides.
+    chain: Annotated[tuple[RubbingJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
+
+    @property
+    def joints(self) -> int:
+        """Actuated and measured joints."""
+        return len(self.chain)
+
+
+Plant: TypeAlias = Annotated[SerialArmPlant | FiveBarPlant | SpringDiscPlant | TreePlant, Field(discriminator="kind")]
+"""Any robot a scenario can move."""
