@@ -17,7 +17,8 @@ namespace quasilpv {
 ///     a_hat = zeta + kappa w,   zeta+ = q zeta - (1 - q) (f + kappa w),   q = exp(-c T),   kappa = (1 - q) / T
 ///
 /// which gives a_hat+ = q a_hat + (1 - q) a whatever the speed does (holding w as well, kappa = c, would leave the
-/// error (c T / (1 - q) - 1) w' in steady acceleration). It starts at a_hat = 0. Anti-windup: see integrate_error().
+/// error (c T / (1 - q) - 1) w' in steady acceleration). It starts at a_hat = 0, or, under a torque in force, at what that
+/// torque leaves of the reference's acceleration. Anti-windup: see integrate_error().
 /// Without a valid measurement the last one is held and e_I is frozen. Source: Dehak 2022, (III.56), with the sign of
 /// the estimate corrected; Mohammadi, Tavakoli, Marquez and Hashemzadeh 2013 for the observer, here in acceleration
 /// coordinates with one bandwidth.
@@ -36,7 +37,19 @@ class ComputedTorqueLaw final : public VelocityLaw<N> {
  private:
   using typename VelocityLaw<N>::Sample;
 
-  void start(const JointVector<N>& speed) noexcept override { observer_state_ = -observer_gain_ * speed; }
+  // Who has held the arm up to now has known the disturbance: what of the reference's acceleration its torque does not
+  // explain. An observer that begins at zero there lets the arm go for as long as it takes to learn.
+  void start(const Sample& sample, const ModelSample<N>& model, const JointVector<N>& in_force) noexcept override {
+    observer_state_ = -observer_gain_ * sample.speed;
+    if (observer_gain_ == 0.0 || in_force.isZero(0.0)) {
+      return;
+    }
+    coriolis_.evaluate({sample.angle.data(), sample.speed.data(), nullptr}, bias_.data());
+    const JointVector<N> known = model.acceleration(in_force - bias_ - model.gravity);
+    if (known.allFinite()) {
+      observer_state_ += sample.reference.acceleration - known;
+    }
+  }
 
   bool feeds_forward() const noexcept override { return true; }
 

@@ -27,7 +27,10 @@ class DelayedFeedbackLaw final : public StabilisingLaw<N> {
  private:
   using WeightArray = std::array<double, kMaxDelayedVertices>;
 
-  void start(const JointVector<N>& /*speed*/) noexcept override { starting_ = true; }
+  void start(const typename VelocityLaw<N>::Sample& /*sample*/, const ModelSample<N>& /*model*/,
+             const JointVector<N>& /*in_force*/) noexcept override {
+    starting_ = true;
+  }
 
   JointVector<N> feedback(const StateError<N>& state, std::array<double, kMaxPremises>& premise,
                           const ModelSample<N>& model, StepReport& report) noexcept override {

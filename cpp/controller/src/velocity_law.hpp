@@ -22,7 +22,6 @@ class VelocityLaw : public ControlLaw {
     if (starting) {
       reference_.reset(measurement_.angle());
       integral_.setZero();
-      start(measurement_.speed());
     }
     const ReferenceVectors<N> reference = reference_.accept(input.reference, report);
     const Sample sample{reference, measurement_.angle(), measurement_.speed(), integral_};
@@ -30,6 +29,9 @@ class VelocityLaw : public ControlLaw {
     to_array<N>(sample.speed, report.estimated_speed);
     to_array<N>(sample.integral, report.integral_error);
     const ModelSample<N> model = sample_model<N>(model_, sample.angle, report);
+    if (starting) {
+      start(sample, model, from_array<N>(limiter_.last_applied()));
+    }
     Command<N> command = control(sample, model, report);
     if (input.joining && !feeds_forward()) {
       command.torque += holding_torque(input.offset, sample.angle, model);
@@ -70,8 +72,9 @@ class VelocityLaw : public ControlLaw {
         measurement_(settings.sample_period_s, velocity_filter_time_constant_s) {}
 
  private:
-  /// The law starts with this speed.
-  virtual void start(const JointVector<N>& /*speed*/) noexcept {}
+  /// The law starts with this sample, under the torque in force: zero if nobody has held the arm.
+  virtual void start(const Sample& /*sample*/, const ModelSample<N>& /*model*/,
+                     const JointVector<N>& /*in_force*/) noexcept {}
   /// Whether control() feeds the acceleration of the reference and gravity forward.
   virtual bool feeds_forward() const noexcept = 0;
   /// The torque of this sample, before limits.
