@@ -23,7 +23,7 @@ from test_scenarios import five_bar_document, spring_disc_document
 Path: TypeAlias = tuple[str | int, ...]
 
 EXTREMES = (1e308, -1e308, 1e101, 1e100, 1e99, 1e13, 1e12, 1e11, 1e6, -1.0, 0.0, 1e-11, 1e-13, 1e-99, 1e-101, 5e-324)
-FEW = (1e308, 1e101, 1e99, -1.0, 0.0, 5e-324)
+FEW = (1e308, 1e99, -1.0, 0.0)
 FREE = {"payloads", "parameters", "witness", "verification", "task"}
 """Members that nobody reads at run time: anything may be in there."""
 
@@ -90,7 +90,7 @@ def readers(kind: str, document: Any) -> tuple[Callable[[], object], Callable[[]
 
 
 def require_agreement(kind: str, document: Any, values: tuple[float, ...]) -> None:
-    for path in numbers(document):
+    for path in fields(document):
         for value in values:
             python, cpp = (refusal(read) for read in readers(kind, replaced(document, path, value)))
             assert (python is None) == (cpp is None), (path, value, python, cpp)
@@ -100,8 +100,8 @@ def require_agreement(kind: str, document: Any, values: tuple[float, ...]) -> No
 def test_both_languages_refuse_the_same_numbers_of_a_scenario(name: str) -> None:
     document = scenario_documents()[name]
     assert readers("scenario", document)[0]() is not None
-    require_agreement("scenario", document, EXTREMES)
-    for path in numbers(document):
+    require_agreement("scenario", document, EXTREMES if name == "square" else FEW)
+    for path in fields(document):
         for value in (1e308, -1e308, 1.1e16):
             assert refusal(readers("scenario", replaced(document, path, value))[0]) is not None, (path, value)
 

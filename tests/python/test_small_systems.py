@@ -90,20 +90,20 @@ def ask_everything(seed: int, options: Options) -> int:
     return sum(asked(plant, name, shape, options) for name, shape in product(CONDITIONS, REPRESENTATIONS))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_small_systems_get_an_answer_or_an_error_of_one_line(seed: int) -> None:
     ask_everything(seed, OPTIONS[seed % len(OPTIONS)])
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("seed", range(8, 200))
+@pytest.mark.parametrize("seed", range(3, 200))
 def test_many_small_systems_get_an_answer_or_an_error_of_one_line(seed: int) -> None:
     for options in OPTIONS:
         ask_everything(seed, options)
 
 
 def test_the_small_systems_get_answers_too() -> None:
-    assert ask_everything(1, Options()) + ask_everything(3, Options()) > 10
+    assert ask_everything(3, Options()) > 5
 
 
 def fully_actuated(drift: sp.Expr) -> DescriptorSystem:

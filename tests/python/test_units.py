@@ -171,7 +171,8 @@ def test_an_observer_found_in_other_units_is_one_of_the_system() -> None:
         assert np.linalg.norm(root @ step @ np.linalg.inv(root), 2) < np.exp(-0.01)
 
 
-@pytest.mark.parametrize("name", [pytest.param("II.7", marks=pytest.mark.full), "II.8"])
+@pytest.mark.full
+@pytest.mark.parametrize("name", ["II.7", "II.8"])
 def test_a_law_with_memory_found_in_other_units_is_one_of_the_system(name: str) -> None:
     plant = random_system(1, order=1, differential=1, spread=0.15, instability=0.3, constant_input=False)
     model, units = polytopic_model(plant, "per-premise"), units_of(plant)
