@@ -48,7 +48,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @dataclass(frozen=True)
 class Row:
-    """One row of the table; the outcome is None where there is no such design, or where the run ended before its time."""
+    """One row of the table; the outcome is None where there is no such design, or where the run ended early."""
 
     scenario: str
     controller: str

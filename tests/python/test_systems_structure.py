@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 from quasilpv.systems.catalogue import SYSTEMS, system
+from quasilpv.systems.descriptor.invertible_cells import cells_with_inverse
 from quasilpv.systems.descriptor.premise import Premise
 from quasilpv.systems.descriptor.structure import Standing, StructureVerdict, structure_report
 from quasilpv.systems.descriptor.system import DescriptorSystem
@@ -137,3 +138,40 @@ def test_when_the_domain_is_not_stated_expect_the_box_to_decide() -> None:
         domain={},
     )
     assert structure_report(model).leading.standing is Standing.REFUTED
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_is_proved_cell_by_cell_is_invertible_at_every_state(seed: int) -> None:
+    """Random E(z), most singular somewhere; nothing is proved where a state has the other sign of det E."""
+    rng = np.random.default_rng(seed)
+    n, (x, y) = int(rng.integers(1, 4)), sp.symbols("x y", real=True)
+    shapes = [sp.cos(x), sp.sin(y), x * y, sp.cos(x + y), x**2]
+    shapes = [shapes[k] for k in rng.permutation(5)[: int(rng.integers(1, 4))]]
+    entries = sp.Matrix(n, n, lambda i, j: sum(float(rng.normal()) * shape for shape in shapes) * rng.uniform(0, 1.5))
+    E = entries + sp.eye(n) * float(rng.uniform(1, 4))
+    domain = {x: (-float(rng.uniform(0.2, 3)), 1.0), y: (-1.0, float(rng.uniform(0.2, 3)))}
+    state = [*sp.symbols(f"v1:{n + 1}"), x, y]
+    whole = sp.diag(E, 1, 1)
+    plant = DescriptorSystem.from_symbols(
+        state=state, E=whole, A=-sp.eye(n + 2), B=sp.ones(n + 2, 1), C=sp.eye(n + 2), inputs="u", domain=domain
+    )
+    cells = cells_with_inverse(plant, plant.E, slice(0, n + 2))
+    determinant = sp.lambdify((x, y), E.det(), "numpy")
+    points = [rng.uniform(*domain[symbol], 2000) for symbol in (x, y)]
+    values = np.broadcast_to(determinant(*points), (2000,))
+    if cells is not None:
+        assert values.min() > 0.0 or values.max() < 0.0
+    elif len(shapes) == 1:
+        assert np.abs(values).min() < 0.3 * np.abs(values).max()
+
+
+def test_inertias_of_wide_postures_are_invertible_although_the_box_of_cosines_holds_singular_ones() -> None:
+    plant = system("ex-II.8", m3=9.0, theta_max=np.pi)
+    finding = structure_report(plant).leading
+    assert finding.standing is Standing.PROVED_OVER_DOMAIN
+    assert "cells of the domain" in finding.reason
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        values = {symbol: rng.uniform(low, high) for symbol, (low, high) in plant.domain.items()}
+        E = plant.E.evaluate([float(premise.expression.subs(values)) for premise in plant.premises])
+        assert np.linalg.eigvalsh(E).min() > 0.0

@@ -22,6 +22,7 @@ from sympy.polys.matrices import DomainMatrix
 
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.algebraic import follows
+from quasilpv.systems.descriptor.invertible_cells import cells_with_inverse
 from quasilpv.systems.descriptor.premise import AffineMatrix
 from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.intervals.chords import Ramp, abs_chord, ramp_chord
@@ -164,6 +165,11 @@ def _invertible(system: DescriptorSystem, name: str, matrix: AffineMatrix, block
     finding = _nonzero_over_box(f"det {name}", determinant, box)
     if finding.holds:
         return finding
+    cells = cells_with_inverse(system, matrix, block)
+    if cells is not None:
+        many = "" if cells == 1 else f" of each of {cells} cells of the domain"
+        reason = f"He({name} G) > 0 at the corners of the premises{many}; {finding.reason}"
+        return Finding(Standing.PROVED_OVER_DOMAIN, reason)
     of_state = determinant.subs(
         {symbol: _without_floats(p.expression) for symbol, p in zip(z, system.premises, strict=True)}
     )

@@ -234,6 +234,11 @@ class IntervalFunction:
         """A range that holds every value on a box."""
         return self._evaluate(box, with_gradient=False)[0]
 
+    def bounds(self, box: Box) -> tuple[float, float]:
+        """The same as doubles, rounded outwards."""
+        value = self.value(box)
+        return _lower(value), _upper(value)
+
     def value_and_gradient(self, box: Box) -> tuple[IntervalValue, list[IntervalValue]]:
         """Ranges that hold every value and every partial derivative on a box."""
         return self._evaluate(box, with_gradient=True)
