@@ -79,6 +79,39 @@ IMPORTS = {
 }
 
 
+def imported_modules(source: str) -> Iterator[str]:
+    """Modules that a text imports, for types too; `from a import b` gives a.b where that is a module, else a."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names = (f"{node.module}.{alias.name}" for alias in node.names)
+            yield from (name if name in SOURCES else node.module for name in names)
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Sets of two or more nodes that reach each other."""
+    reach = {node: set(following) for node, following in graph.items()}
+    while True:
+        further = {node: own.union(*(reach[next_] for next_ in own)) for node, own in reach.items()}
+        if further == reach:
+            break
+        reach = further
+    found = {frozenset({node} | {other for other in reach[node] if node in reach[other]}) for node in graph}
+    return [sorted(circle) for circle in found if len(circle) > 1]
+
+
+NEIGHBOURS = {
+    name: {
+        other
+        for other in imported_modules(path.read_text(encoding="utf-8"))
+        if other in SOURCES and other != name and room_of(other) == room_of(name)
+    }
+    for name, path in SOURCES.items()
+}
+"""What every module imports of its own room."""
+
+
 def loaded_with(module: str) -> set[str]:
     """Everything that importing a module imports, through modules of the package."""
     seen: set[str] = set()
@@ -121,6 +154,27 @@ def test_every_room_has_a_place_in_the_order() -> None:
 @pytest.mark.parametrize("module", SOURCES)
 def test_no_module_imports_a_higher_layer(module: str) -> None:
     assert upward_imports(module, IMPORTS[module]) == set()
+
+
+def test_no_modules_of_a_room_import_each_other_in_a_circle() -> None:
+    assert circles(NEIGHBOURS) == []
+
+
+def test_no_folders_of_a_room_import_each_other_in_a_circle() -> None:
+    folders = {
+        name: ".".join(name.split(".")[:3])
+        for name, path in SOURCES.items()
+        if len(path.relative_to(PACKAGE).parts) > 2  # in a folder of the room
+    }
+    graph: dict[str, set[str]] = {folder: set() for folder in folders.values()}
+    for name, folder in folders.items():
+        graph[folder] |= {folders[other] for other in NEIGHBOURS[name] if other in folders} - {folder}
+    assert circles(graph) == []
+
+
+def test_when_two_modules_reach_each_other_expect_them_found() -> None:
+    graph = {"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": set()}
+    assert circles(graph) == [["b", "c"]]
 
 
 @pytest.mark.parametrize("module", [name for name in SOURCES if room_of(name) in SEPARATE])

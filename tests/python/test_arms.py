@@ -17,14 +17,15 @@ from scipy.integrate import solve_ivp
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.arm_parameters import Link, OperatingDomain, PayloadSet
 from quasilpv.systems.robots.arms import PlanarSerialArm
-from quasilpv.systems.robots.registry import robot
+from quasilpv.systems.robots.printed_arms import PrintedSerialArm
+from quasilpv.systems.robots.registry import arm2, arm3, robot
 
-ARM2, ARM3 = robot("arm2").model, robot("arm3").model
-NAMED = [ARM2, ARM3, replace(ARM2, equilibrium="upright"), replace(ARM3, coriolis_factorisation="christoffel")]
+ARM2, ARM3 = arm2(), arm3()
+NAMED = [ARM2, ARM3, replace(ARM2, equilibrium="upright"), ARM3.skew]
 names = pytest.mark.parametrize("arm", NAMED, ids=["arm2", "arm3", "arm2-upright", "arm3-christoffel"])
 
 
-def truncated_arm3() -> PlanarSerialArm:
+def truncated_arm3() -> PrintedSerialArm:
     """The 3-DoF arm with r_2 as printed."""
     first, second, third = ARM3.links
     return replace(ARM3, links=(first, replace(second, com_m=0.489), third))
@@ -194,13 +195,13 @@ def test_inertia_rate_minus_twice_the_christoffel_matrix_is_skew_symmetric(case:
 
 
 @pytest.mark.parametrize("arm", [ARM2, ARM3], ids=lambda arm: arm.name)
-def test_printed_factorisation_is_passive_along_the_motion_but_not_skew(arm: PlanarSerialArm) -> None:
+def test_printed_factorisation_is_passive_along_the_motion_but_not_skew(arm: PrintedSerialArm) -> None:
     rng = np.random.default_rng(3)
     for _ in range(50):
         theta, omega = random_state(arm, rng)
         difference = inertia_rate(arm, theta, omega) - 2 * arm.coriolis_matrix(theta, omega)
         assert_allclose(omega @ difference @ omega, 0, atol=1e-4)
-        christoffel = replace(arm, coriolis_factorisation="christoffel")
+        christoffel = arm.skew
         assert_allclose(arm.coriolis(theta, omega), christoffel.coriolis(theta, omega), atol=1e-11)
         assert np.abs(difference + difference.T).max() > 1e-3
 

@@ -18,7 +18,8 @@ from bench_report import DisagreementError
 from bench_solvers import Conic, Cvxopt, Scs, decide_with
 
 from quasilpv.lmi import Problem, Variable, he
-from quasilpv.lmi.compiled import CompiledProblem, Layout
+from quasilpv.lmi.compiled import CompiledProblem
+from quasilpv.lmi.layout import Layout
 from quasilpv.studies import Verdict
 
 ROOT = Path(__file__).parents[2]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from quasilpv.errors import InputError
+from quasilpv.synthesis.baselines.printed import printed_bandwidth_rad_s
 from quasilpv.systems.robots.arm_parameters import Link
 from quasilpv.systems.robots.fivebar import RhombicFiveBar
 from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
@@ -299,7 +300,7 @@ def test_parallel_computed_torque_with_passive_joints_is_computed_torque_on_the_
 
 
 def test_when_the_gains_of_the_thesis_are_rebuilt_expect_the_printed_ones_but_for_truncated_inertias() -> None:
-    w = ROBOT.printed_bandwidth_rad_s
+    w = printed_bandwidth_rad_s(ROBOT)
     printed = np.array([634.71, 2.5254, 5.3173e4])
     ours = RHOMBUS.driven_inertia[0] * np.array([3 * w**2, 3 * w, w**3])
     assert ours == pytest.approx(printed, rel=2e-3)

@@ -25,8 +25,8 @@ from quasilpv.experiments.track import TrackingExperiment, track
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
 from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification
-from quasilpv.synthesis.hinf import hinf_tracking, unknown_torques
+from quasilpv.synthesis import Specification, hinf
+from quasilpv.synthesis.hinf import friction_bound_nm_s, hinf_tracking, unknown_torques
 from quasilpv.synthesis.torque.schedule import full_schedule
 from quasilpv.systems.robots.registry import robot
 from reference.mutants import BLOCKS, Mutant
@@ -81,7 +81,7 @@ def test_when_states_and_payloads_are_drawn_expect_the_torque_as_a_sum_of_unknow
     rng = np.random.default_rng(3)
     for _ in range(200):
         plant = arm.with_payload_fraction(rng.uniform())
-        friction = rng.uniform(-arm.friction_bound_nm_s, arm.friction_bound_nm_s, n)
+        friction = rng.uniform(-friction_bound_nm_s(arm), friction_bound_nm_s(arm), n)
         theta = rng.uniform(*np.array(arm.domain.angle_rad).T)
         omega = rng.uniform(*np.array(arm.domain.speed_rad_s).T)
         alpha, W = np.cumsum(theta), np.cumsum(omega)
@@ -100,7 +100,7 @@ def test_when_the_checker_bounds_the_unknown_terms_itself_expect_those_of_the_de
     for robot_id in ("arm2", "arm3", "fivebar"):
         arm = robot(robot_id)
         content = release(robot_id, "pid").artifact.content()
-        content["witness"] = {"feedback": {"friction_nm_s": arm.friction_bound_nm_s}}
+        content["witness"] = {"feedback": {"friction_nm_s": friction_bound_nm_s(arm)}}
         terms, unknown = unknown_terms(content), unknown_torques(arm)
         assert len(terms) == len(unknown.radius)
         for k, term in enumerate(terms):
@@ -276,15 +276,18 @@ def test_when_a_design_is_released_expect_its_gate_passed_and_not_called_a_proof
     assert not gate(fast).passed
 
 
-def test_when_the_bound_on_friction_is_that_of_the_robot_expect_a_design_for_the_five_bar() -> None:
+def test_when_the_bound_on_friction_is_that_of_the_robot_expect_a_design_for_the_five_bar(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """With the 10 N m s of the arms, 2500 times its inertia per second, no gain of this size passes the gate."""
     specification, entry = Specification(rate_hz=RATE_HZ, disturbance_frequency_rad_s=50.0), robot("fivebar")
     content = release("fivebar", "hinf-tracking", specification).artifact.content()
     assert content["verification"]["certificate"]["verified"]
     assert content["verification"]["gate"]["passed"]
-    assert content["witness"]["feedback"]["friction_nm_s"] == entry.friction_bound_nm_s
+    assert content["witness"]["feedback"]["friction_nm_s"] == friction_bound_nm_s(entry)
+    monkeypatch.setattr(hinf, "FRICTION_BOUNDS_NM_S", {})
     with pytest.raises(InfeasibleError):
-        hinf_tracking(replace(entry, friction_bound_nm_s=10.0), specification)
+        hinf_tracking(entry, specification)
 
 
 def test_when_the_robot_holds_a_spring_expect_a_refusal() -> None:

@@ -12,6 +12,7 @@ from quasilpv.systems.descriptor.premise import Premise
 from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.robots.arm_parameters import OperatingDomain
 from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.printed_arms import PrintedSerialArm
 from quasilpv.systems.robots.registry import robot, robots
 
 x1, x2 = sp.symbols("x1 x2", real=True)
@@ -92,7 +93,7 @@ def arms() -> list[PlanarSerialArm]:
     three = nominal[1]
     return [
         *nominal,
-        PlanarSerialArm("upright2", nominal[0].links, equilibrium="upright", coriolis_factorisation="printed"),
+        PrintedSerialArm("upright2", nominal[0].links, equilibrium="upright"),
         PlanarSerialArm("christoffel3", three.links),
         PlanarSerialArm("single", three.links[:1]),
         PlanarSerialArm("four", three.links + three.links[:1]),

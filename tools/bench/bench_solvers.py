@@ -14,7 +14,8 @@ import numpy.typing as npt
 from scipy import sparse
 
 from quasilpv.lmi.assembly import triangle_places
-from quasilpv.lmi.compiled import CompiledProblem, Layout, rounded
+from quasilpv.lmi.compiled import CompiledProblem, rounded
+from quasilpv.lmi.layout import Layout
 from quasilpv.studies import Verdict
 
 FloatArray = npt.NDArray[np.float64]

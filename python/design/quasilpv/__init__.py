@@ -18,7 +18,7 @@ _HOMES = {
     "boundary": "studies.front_door",
     "design": "chain",
     "gate": "chain",
-    "rate": "systems.descriptor.equations",
+    "rate": "systems.descriptor.names",
     "region": "studies.front_door",
     "robot": "chain",
     "simulate": "chain",

@@ -12,7 +12,7 @@ from quasilpv.studies.front_door import boundary as boundary
 from quasilpv.studies.front_door import region as region
 from quasilpv.studies.front_door import solve as solve
 from quasilpv.studies.law import Law as Law
-from quasilpv.systems.descriptor.equations import rate as rate
+from quasilpv.systems.descriptor.names import rate as rate
 from quasilpv.systems.descriptor.structure import structure_report as structure_report
 from quasilpv.systems.descriptor.system import DescriptorSystem as DescriptorSystem
 

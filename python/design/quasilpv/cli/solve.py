@@ -30,7 +30,7 @@ def solve_command(
     """
     from quasilpv.studies import Verdict, answered
     from quasilpv.studies.answer import reliance_document
-    from quasilpv.studies.question import largest_or_reached_margin
+    from quasilpv.studies.answering import largest_or_reached_margin
 
     answer = answered(asked)
     margin = largest_or_reached_margin(asked, answer)

@@ -5,10 +5,11 @@ constraints, solver back ends, what a solution is worth (exact check, margin, sc
 here knows what a controller is.
 """
 
+from quasilpv.lmi.constraint import Constraint
 from quasilpv.lmi.exact import is_positive_definite, to_rational
 from quasilpv.lmi.expressions import Expression, Variable, block, constant, he, identity, zeros
 from quasilpv.lmi.margin import Margin, largest_margin
-from quasilpv.lmi.problem import Constraint, Outcome, Problem, Solution
+from quasilpv.lmi.problem import Outcome, Problem, Solution
 from quasilpv.lmi.scaling import ScalingReport, scaling_report
 from quasilpv.lmi.sdpa_format import SdpaProgram
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias, get_args
 
 from quasilpv.lmi import clarabel_backend
+from quasilpv.lmi.constraint import Constraint
 from quasilpv.lmi.expressions import Expression, Variable
 from quasilpv.lmi.raw_solution import RawSolution
-
-if TYPE_CHECKING:
-    from quasilpv.lmi.problem import Constraint
 
 BackendName: TypeAlias = Literal["clarabel", "cvxpy"]
 

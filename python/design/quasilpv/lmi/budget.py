@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from math import isfinite
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -28,9 +28,7 @@ from scipy.sparse.csgraph import connected_components
 
 from quasilpv.defaults import DEFAULT_MEMORY_GIB, DEFAULT_TIME_S
 from quasilpv.errors import InputError, QuasilpvError
-
-if TYPE_CHECKING:
-    from quasilpv.lmi.compiled import Layout
+from quasilpv.lmi.layout import Layout
 
 IndexArray = npt.NDArray[np.intp]
 

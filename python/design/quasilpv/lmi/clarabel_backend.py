@@ -9,18 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 
 from quasilpv.lmi import budget, worker
 from quasilpv.lmi.assembly import gradient, unpack, upper_triangle
+from quasilpv.lmi.constraint import Constraint
 from quasilpv.lmi.expressions import Expression, Variable
 from quasilpv.lmi.raw_solution import RawSolution
-
-if TYPE_CHECKING:
-    from quasilpv.lmi.problem import Constraint
 
 
 def solve(

@@ -14,7 +14,8 @@ from math import lcm
 
 import numpy as np
 
-from quasilpv.lmi.compiled import SHORT, CompiledFamily, CompiledProblem, Layout
+from quasilpv.lmi.compiled import SHORT, CompiledFamily, CompiledProblem
+from quasilpv.lmi.layout import Layout
 
 
 def common_problem(family: CompiledFamily, points: Sequence[Mapping[str, float]]) -> CompiledProblem:

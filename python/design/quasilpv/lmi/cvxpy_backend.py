@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import cvxpy as cp
 import numpy as np
 
+from quasilpv.lmi.constraint import Constraint
 from quasilpv.lmi.expressions import Expression, ScalarProduct, Term, Variable
 from quasilpv.lmi.raw_solution import RawSolution
-
-if TYPE_CHECKING:
-    from quasilpv.lmi.problem import Constraint
 
 DEFAULT_SOLVER = "CLARABEL"
 INSTALLED_SOLVERS: tuple[str, ...] = tuple(cp.installed_solvers())  # type: ignore[no-untyped-call]

@@ -24,9 +24,10 @@ import numpy.typing as npt
 
 from quasilpv.lmi import backends
 from quasilpv.lmi.backends import BackendName
+from quasilpv.lmi.constraint import Constraint
 from quasilpv.lmi.exact import Matrix
 from quasilpv.lmi.expressions import Expression, Product, ScalarProduct, Term, Variable, constant, identity, zeros
-from quasilpv.lmi.problem import Constraint, Outcome, Problem
+from quasilpv.lmi.problem import Outcome, Problem
 
 UNDECIDED = 1e-5
 """Smaller margins are within reach of the solver's accuracy: neither verdict is given. Also the weight eps."""

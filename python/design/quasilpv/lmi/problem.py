@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from quasilpv.lmi import backends, budget
 from quasilpv.lmi.backends import BackendName
+from quasilpv.lmi.constraint import Constraint
 from quasilpv.lmi.exact import Matrix, is_positive_definite, symmetric_part, to_rational
 from quasilpv.lmi.expressions import Expression, Operand, Variable, as_expression, identity
 from quasilpv.lmi.raw_solution import RawSolution
@@ -24,14 +25,6 @@ class Outcome(Enum):
     SOLVER_ONLY = "solver_only"  # the solver says solved, the exact check says no
     INFEASIBLE_NUMERICALLY = "infeasible_numerically"  # the solver found a dual certificate, not checked exactly
     UNKNOWN = "unknown"  # the solver gave up
-
-
-@dataclass(frozen=True)
-class Constraint:
-    """The inequality ``expression > 0`` (positive definite)."""
-
-    name: str
-    expression: Expression
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,9 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from quasilpv.polytopes.units import Units
+from quasilpv.systems.descriptor.affine_system import SystemMatrices
 from quasilpv.systems.descriptor.premise import AffineMatrix
-from quasilpv.systems.descriptor.system import DescriptorSystem, SystemMatrices
+from quasilpv.systems.descriptor.system import DescriptorSystem
 
 FloatArray = NDArray[np.float64]
 

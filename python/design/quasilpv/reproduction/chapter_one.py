@@ -11,8 +11,9 @@ from quasilpv.reproduction import rules
 from quasilpv.reproduction.grids import axis, grid, nested_figure, sizes
 from quasilpv.reproduction.item import Check, Effort, Finding, Item
 from quasilpv.studies.answer import Verdict
-from quasilpv.studies.question import Question, Sweep
+from quasilpv.studies.question import Question
 from quasilpv.studies.region import Region
+from quasilpv.studies.sweep import Sweep
 
 ARM2_AXES = ("mass m2 of link 2 (kg)", "friction fv1 = fv2/2 (N m s/rad)")
 ARM3_AXES = ("mass m3 of link 3 (kg)", "friction fv of every joint (N m s/rad)")

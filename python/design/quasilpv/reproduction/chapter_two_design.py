@@ -11,8 +11,9 @@ from quasilpv.reproduction.grids import axis, grid, limits, nested_figure, sizes
 from quasilpv.reproduction.item import Effort, Finding, Item
 from quasilpv.studies.answer import Verdict
 from quasilpv.studies.boundary import Interval
-from quasilpv.studies.question import Question, Sweep
+from quasilpv.studies.question import Question
 from quasilpv.studies.region import Axis, Region
+from quasilpv.studies.sweep import Sweep
 
 PROXIES = (
     "the theorems of He 2021, Zhang 2017, Bouarar 2010 and Dehak 2020 are not restated in the source: Theorem I.2 on"

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from quasilpv.conditions.condition import Form
-from quasilpv.lmi.problem import Constraint, Problem
+from quasilpv.lmi.constraint import Constraint
+from quasilpv.lmi.problem import Problem
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.item import Finding
 from quasilpv.studies.complexity import Complexity, measured

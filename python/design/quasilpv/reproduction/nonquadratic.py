@@ -22,7 +22,8 @@ from quasilpv.reproduction.grids import axis, grid, limits, nested_figure, sizes
 from quasilpv.reproduction.item import Check, Effort, Finding, Item
 from quasilpv.studies.answer import Verdict
 from quasilpv.studies.boundary import Interval
-from quasilpv.studies.question import Question, Sweep
+from quasilpv.studies.question import Question
+from quasilpv.studies.sweep import Sweep
 from quasilpv.systems.descriptor.premise import AffineMatrix
 
 METHODS = {

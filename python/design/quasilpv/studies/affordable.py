@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from quasilpv.conditions.choices import Slack
 from quasilpv.conditions.registry import condition
@@ -14,11 +13,10 @@ from quasilpv.defaults import DEFAULT_MEMORY_GIB
 from quasilpv.errors import InputError
 from quasilpv.lmi import budget
 from quasilpv.lmi.budget import Limits, Size, TimeUpError, TooLargeError
-from quasilpv.lmi.compiled import CompiledProblem, Layout
+from quasilpv.lmi.compiled import CompiledProblem
+from quasilpv.lmi.layout import Layout
 from quasilpv.studies.answer import Answer, Verdict
-
-if TYPE_CHECKING:
-    from quasilpv.studies.question import Question
+from quasilpv.studies.question import Question
 
 WAYS_S = 6.0
 """What looking for cheaper ways may take in all: no answer comes later than that after its time limit."""

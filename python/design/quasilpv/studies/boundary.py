@@ -8,7 +8,8 @@ from typing import Any
 from quasilpv.defaults import RELATIVE_TOLERANCE
 from quasilpv.errors import InputError
 from quasilpv.studies.answer import Answer, Evidence, Verdict
-from quasilpv.studies.question import Question, Sweep
+from quasilpv.studies.question import Question
+from quasilpv.studies.sweep import Sweep
 from quasilpv.systems.catalogue import system_kind
 
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from quasilpv.conditions.condition import Form, Statement
-from quasilpv.lmi.problem import Constraint
+from quasilpv.lmi.constraint import Constraint
 from quasilpv.studies.question import Question
 
 

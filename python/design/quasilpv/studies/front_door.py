@@ -14,10 +14,11 @@ from quasilpv.defaults import RELATIVE_TOLERANCE
 from quasilpv.errors import InputError
 from quasilpv.lmi.budget import DEFAULT, Limits
 from quasilpv.studies.answer import Answer
+from quasilpv.studies.answering import answered
 from quasilpv.studies.boundary import Boundary, Interval, find_boundary
 from quasilpv.studies.checkpoint import Forgetful
 from quasilpv.studies.engines import in_processes
-from quasilpv.studies.question import Question, answered
+from quasilpv.studies.question import Question
 from quasilpv.studies.region import Axis, Map, Region
 from quasilpv.systems.own_kind import SystemLike, own_kind
 

@@ -20,7 +20,8 @@ import numpy.typing as npt
 from quasilpv.errors import InputError
 from quasilpv.studies.answer import Answer, Verdict
 from quasilpv.studies.quadtree import Cell, Division, Node, divide
-from quasilpv.studies.question import Question, Sweep
+from quasilpv.studies.question import Question
+from quasilpv.studies.sweep import Sweep
 from quasilpv.systems.catalogue import system_kind
 
 Place: TypeAlias = tuple[float, ...]

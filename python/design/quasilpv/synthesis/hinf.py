@@ -33,7 +33,6 @@ from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
 from quasilpv.synthesis.torque.schedule import ScheduledPlants, full_schedule
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.registry import Robot
-from quasilpv.systems.robots.rolling_disc import RollingDisc
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -47,6 +46,18 @@ BACK_OFF = 0.05
 GAIN_LIMITS = (120.0, 160.0, 200.0, 240.0)
 BANDWIDTHS = tuple(float(w) for w in np.geomspace(0.006, 0.016, 21))
 FILTER_TIMES = (1.5, 2.0)
+
+
+FRICTION_BOUND_NM_S = 10.0
+"""Largest viscous friction coefficient of a joint that the law has to withstand, N m s/rad (Dehak 2022, III.3.3)."""
+
+FRICTION_BOUNDS_NM_S = {"fivebar": 0.01}
+"""By robot, where it is another one: friction that takes 0.4 s to stop a link."""
+
+
+def friction_bound_nm_s(robot: Robot) -> float:
+    """Largest viscous friction coefficient of a joint of a robot, N m s/rad; the model itself may have none."""
+    return FRICTION_BOUNDS_NM_S.get(robot.id, FRICTION_BOUND_NM_S)
 
 
 def unknown_torques(robot: Robot) -> UnknownTorques:
@@ -67,7 +78,7 @@ def unknown_torques(robot: Robot) -> UnknownTorques:
     D = heaviest.inertia_constants
     coriolis = [(S[k], [none, S[j], none], abs(D[k, j]) * speed[j]) for k in range(n) for j in range(n) if k != j]
     gravity = [(S[k], [S[k], none, none], heaviest.gravity_constants[k]) for k in range(n)]
-    friction = [(e[k], [none, e[k], none], robot.friction_bound_nm_s) for k in range(n)]
+    friction = [(e[k], [none, e[k], none], friction_bound_nm_s(robot)) for k in range(n)]
     torque, state, radius = zip(*coriolis, *gravity, *friction, strict=True)
     return UnknownTorques(np.array(torque), np.array([np.concatenate(c) for c in state]), np.array(radius))
 
@@ -180,7 +191,7 @@ def hinf_tracking(robot: Robot, specification: Specification, progress: Progress
         InfeasibleError: the robot holds a spring, the inequalities have no verified solution, or no point of the search
             is stable with every payload and delay within the torque activity.
     """
-    if isinstance(robot.model, RollingDisc):
+    if robot.model.holds_spring:
         raise InfeasibleError(f"{robot.id}: no hinf-tracking design: the bounds of its terms know gravity, no spring")
     chosen = full_schedule(robot)
     screen = ScheduledPlants.of(robot, chosen, PlantGrid.screen(robot))
@@ -226,7 +237,7 @@ def _tracking_design(search: _Search, tables: HinfTables, loops: LoopGrid) -> Tr
                 "beta": point.beta,
                 "bandwidth_rad_s": point.rate,
                 "inertia_unit_kg_m2": point.inertia_unit,
-                "friction_nm_s": robot.friction_bound_nm_s,
+                "friction_nm_s": friction_bound_nm_s(robot),
                 "tau": point.tau.tolist(),
             }
         },

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,8 @@ import sympy as sp
 
 from quasilpv.errors import InfeasibleError
 from quasilpv.polytopes import BlockPolytope
-from quasilpv.systems.descriptor.premise import Premise
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise
+from quasilpv.systems.robots.arm_parameters import OperatingDomain
 from quasilpv.systems.robots.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
@@ -77,15 +79,23 @@ def schedule_of(robot: Robot, chosen: Sequence[int]) -> Schedule:
     return Schedule(scheduled, polytope, vertices, float(np.linalg.eigvals(pairs).real.max()))
 
 
+@runtime_checkable
+class Premultiplied(Protocol):
+    """A robot by whose own matrix the source multiplies the equations of motion."""
+
+    def premultiplication(self, domain: OperatingDomain) -> tuple[tuple[Premise, ...], AffineMatrix]:
+        """Premises, and the matrix affine in them."""
+
+
 def premultiplied_schedule(robot: Robot) -> Schedule:
     """The schedule of the robot's own premultiplication, with the constant inertia of its driven joints.
 
     Raises:
         InfeasibleError: the robot has none.
     """
-    source = robot.model.premultiplication(robot.domain)
-    if source is None:
+    if not isinstance(robot.model, Premultiplied):
         raise InfeasibleError(f"{robot.id}: no dob-torque-premultiplied design: the robot has no premultiplication")
+    source = robot.model.premultiplication(robot.domain)
     premises, beta = tuple(premise.widened() for premise in source[0]), source[1]
     polytope = BlockPolytope.takagi_sugeno([p.lower for p in premises], [p.upper for p in premises])
     vertices = polytope.vertices(beta.constant, beta.coefficients)

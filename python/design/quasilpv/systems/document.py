@@ -22,9 +22,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.formula import parse_expression
+from quasilpv.systems.descriptor.names import symbol
 from quasilpv.systems.descriptor.open_parameters import OpenParameters
 from quasilpv.systems.descriptor.system import DescriptorSystem
-from quasilpv.systems.descriptor.vocabulary import exact, symbol
+from quasilpv.systems.descriptor.vocabulary import exact
 from quasilpv.systems.system_kind import Parameter, SystemKind
 
 MAX_BYTES = 1_000_000

@@ -23,6 +23,10 @@ from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, pr
 from quasilpv.systems.robots.registry import Robot
 
 ARM_BANDWIDTH_RAD_S = 15.0 * math.pi
+
+PRINTED_BANDWIDTHS_RAD_S = {"fivebar": 80.0 * math.pi}
+"""Triple poles of the gains that Dehak (2022) prints, by robot, where they are not those of the arms."""
+
 ARM_VELOCITY_FILTER_S = 2e-3
 """First-order filter of the measured speed at that bandwidth, faster in proportion for faster robots; the thesis names
 the filter, not its time constant."""
@@ -56,7 +60,7 @@ class Tuning:
     @classmethod
     def printed(cls, robot: Robot, observer_bandwidth_rad_s: float = 0.0) -> Tuning:
         """The printed gains of a robot."""
-        bandwidth = robot.printed_bandwidth_rad_s
+        bandwidth = printed_bandwidth_rad_s(robot)
         filter_time = ARM_VELOCITY_FILTER_S * (ARM_BANDWIDTH_RAD_S / bandwidth)
         return cls(bandwidth, filter_time, observer_bandwidth_rad_s=observer_bandwidth_rad_s)
 
@@ -64,6 +68,11 @@ class Tuning:
         """Gains (kp, kd, ki) per unit inertia: ``s^3 + kd s^2 + kp s + ki = (s + w)^2 (s + rho w)``."""
         w, rho = self.bandwidth_rad_s, self.integral_ratio
         return (1.0 + 2.0 * rho) * w**2, (2.0 + rho) * w, rho * w**3
+
+
+def printed_bandwidth_rad_s(robot: Robot) -> float:
+    """Triple pole of the gains that Dehak (2022) prints for a robot, rad/s; that of the arms if it prints none."""
+    return PRINTED_BANDWIDTHS_RAD_S.get(robot.id, ARM_BANDWIDTH_RAD_S)
 
 
 def stretched_inertia(robot: Robot, payload_fraction: float) -> npt.NDArray[np.float64]:

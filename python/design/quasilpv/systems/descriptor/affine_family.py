@@ -87,7 +87,7 @@ def affine_family(
             made = make(record)
         if len(record.made) != 1 or record.made[0].system is not made:
             return None  # it was changed after it was made, or is another one
-        return _family(record.made[0], record, base, steps)
+        return _family(made, record.made[0], record, base, steps)
     except Exception:  # code of users that needs numbers, or a system that does not exist for all of them
         return None
 
@@ -98,9 +98,13 @@ def _short(value: float) -> float:
 
 
 def _family(
-    made: Made, record: OpenParameters, base: Mapping[str, float], steps: Mapping[str, float]
+    system: DescriptorSystem,
+    made: Made,
+    record: OpenParameters,
+    base: Mapping[str, float],
+    steps: Mapping[str, float],
 ) -> AffineFamily | None:
-    system, symbols = made.system, list(record.symbols.values())
+    symbols = list(record.symbols.values())
     C = made.matrices[3]
     if C.free_symbols & set(symbols):
         return None  # which premises are measured may depend on it

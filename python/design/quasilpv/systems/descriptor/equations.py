@@ -13,7 +13,8 @@ import sympy as sp
 
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.factoring import expanded, split
-from quasilpv.systems.descriptor.vocabulary import Formula, Vocabulary, exact, rate, symbol
+from quasilpv.systems.descriptor.names import rate, symbol
+from quasilpv.systems.descriptor.vocabulary import Formula, Vocabulary, exact
 
 __all__ = ["RESIDUAL", "EquationMatrices", "Equilibrium", "equation_matrices", "rate"]
 

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quasilpv.errors import InputError
+from quasilpv.systems.descriptor.affine_system import AffineSystem
 from quasilpv.systems.descriptor.premise import AffineMatrix
 
-if TYPE_CHECKING:
-    from quasilpv.systems.descriptor.system import DescriptorSystem
+System = TypeVar("System", bound=AffineSystem)
 
 # A coefficient matrix written in doubles has its rank up to rounding only.
 _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class NormBoundedUncertainty:
+class NormBoundedUncertainty(Generic[System]):
     """Unknown premises as ``A + H_a Delta W_a`` and ``B + H_b Delta' W_b`` with ``|Delta| <= 1``, ``|Delta'| <= 1``.
 
     An unknown premise in [lower, upper] is ``centre + radius d`` with ``|d| <= 1``; each coefficient matrix times its
@@ -34,14 +34,14 @@ class NormBoundedUncertainty:
     Reference: Dehak 2022, (I.37) and Theorem I.3.
     """
 
-    nominal: DescriptorSystem
+    nominal: System
     Ha: NDArray[np.float64]
     Wa: NDArray[np.float64]
     Hb: NDArray[np.float64]
     Wb: NDArray[np.float64]
 
     @classmethod
-    def of(cls, system: DescriptorSystem, unknown: Sequence[int]) -> NormBoundedUncertainty:
+    def of(cls, system: System, unknown: Sequence[int]) -> NormBoundedUncertainty[System]:
         """Take the premises of the given indices for unknown.
 
         Raises:

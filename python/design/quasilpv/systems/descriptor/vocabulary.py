@@ -7,7 +7,6 @@ not occur.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import inf, isnan
 from typing import Any, TypeAlias
@@ -17,43 +16,21 @@ from sympy.core.function import AppliedUndef
 
 from quasilpv.errors import InputError, one_of
 from quasilpv.systems.descriptor.formula import parse_equation, split_names
-from quasilpv.systems.descriptor.open_parameters import OpenNumber, open_parameters
+from quasilpv.systems.descriptor.names import IDENTIFIER, Name, rate, symbol
+from quasilpv.systems.descriptor.open_number import OpenNumber
+from quasilpv.systems.descriptor.open_parameters import open_parameters
 
-Name: TypeAlias = "str | sp.Symbol | AppliedUndef"
 Formula: TypeAlias = "str | sp.Expr | sp.Eq | float"
 SymbolicMatrix: TypeAlias = "sp.Matrix | Sequence[Sequence[Formula]]"
 """A matrix of sympy, or rows of expressions, numbers and formulas as text."""
 Bounds: TypeAlias = "tuple[float, float]"
 
-_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 _SIGNS = (  # an assumption of a symbol, and the interval it says
     ("is_positive", 0.0, inf),
     ("is_nonnegative", 0.0, inf),
     ("is_negative", -inf, 0.0),
     ("is_nonpositive", -inf, 0.0),
 )
-
-
-def symbol(name: Name) -> sp.Symbol:
-    """The real symbol of a name, a symbol with any assumptions, or a function of time such as x(t).
-
-    Raises:
-        InputError: a text that is no name, or anything else.
-    """
-    if isinstance(name, str) and _IDENTIFIER.fullmatch(name):
-        return sp.Symbol(name, real=True)
-    if isinstance(name, sp.Dummy):  # the same name does not make two of them one
-        return name
-    if isinstance(name, sp.Symbol):
-        return sp.Symbol(name.name, real=True)
-    if isinstance(name, AppliedUndef) and len(name.args) == 1 and name.args[0].is_Symbol:
-        return sp.Symbol(name.func.__name__, real=True)
-    raise InputError("system", "name", name, "a name of letters, digits and _, or a symbol")
-
-
-def rate(state: Name) -> sp.Symbol:
-    """The symbol that stands for the time derivative of a state in an equation."""
-    return sp.Symbol(f"{symbol(state).name}'", real=True)
 
 
 class Vocabulary:
@@ -124,7 +101,7 @@ class Vocabulary:
         left_open = open_parameters()
         allowed += left_open.values if left_open else ()
         if isinstance(formula, str):  # what has the factor 0 is written down all the same
-            self._mentioned |= {name for name in allowed if name.name in _IDENTIFIER.findall(formula)}
+            self._mentioned |= {name for name in allowed if name.name in IDENTIFIER.findall(formula)}
             expression = parse_equation(f"{self.source}: {field}", formula, {name.name: name for name in allowed})
         else:
             expression = self._canonical(field, formula)

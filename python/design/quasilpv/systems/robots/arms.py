@@ -24,7 +24,8 @@ from numpy.typing import ArrayLike
 
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.arm_parameters import Link
-from quasilpv.systems.robots.mechanism import Matrix, PlanarMechanism, Vector
+from quasilpv.systems.robots.dynamics import Matrix, Vector
+from quasilpv.systems.robots.mechanism import PlanarMechanism
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,9 @@ class PlanarSerialArm(PlanarMechanism):
         gravity_m_s2: gravitational acceleration g >= 0.
         equilibrium: what theta = 0 is: ``"hanging"`` (stable, link k points to (sin alpha_k, -cos alpha_k)) or
             ``"upright"`` (unstable, the same arm with theta_1 counted from the upward vertical).
-        coriolis_factorisation: which matrix N with the right N omega is meant: ``"christoffel"`` (dM/dt - 2 N is
-            skew-symmetric) or ``"printed"`` (Dehak 2022, Examples I.2 and I.4 with their signs corrected; only
-            omega^T (dM/dt - 2 N) omega = 0 holds; defined for n = 2 and 3).
 
     Raises:
-        InputError: no links, a negative or non-finite gravity, or the printed factorisation for another n.
+        InputError: no links, or a negative or non-finite gravity.
 
     Reference: Spong, Hutchinson and Vidyasagar (2006), chapter 7; Dehak 2022, Examples I.2 and I.4.
     """
@@ -53,7 +51,6 @@ class PlanarSerialArm(PlanarMechanism):
     links: tuple[Link, ...]
     gravity_m_s2: float = 9.81
     equilibrium: Literal["hanging", "upright"] = "hanging"
-    coriolis_factorisation: Literal["christoffel", "printed"] = "christoffel"
 
     def __post_init__(self) -> None:
         """Refuse arms that are not well defined."""
@@ -63,8 +60,6 @@ class PlanarSerialArm(PlanarMechanism):
             raise InputError(self.name, "gravity_m_s2", self.gravity_m_s2, "a finite number >= 0")
         if self.equilibrium not in ("hanging", "upright"):
             raise InputError(self.name, "equilibrium", self.equilibrium, "hanging or upright")
-        if self.coriolis_factorisation == "printed" and self.joints not in (2, 3):
-            raise InputError(self.name, "coriolis_factorisation", "printed", "christoffel unless n = 2 or 3")
 
     # ---- constants -------------------------------------------------------------------------------------------------
 
@@ -111,15 +106,6 @@ class PlanarSerialArm(PlanarMechanism):
         """Largest diagonal entries of M, those of the stretched arm."""
         return np.diag(self.inertia(np.zeros(self.joints)))
 
-    @property
-    def printed_coriolis_shift(self) -> float:
-        """Sign of what separates the printed N from the skew one, 0 for other factorisations.
-
-        ``N_printed = N_christoffel + shift D_12 sin(theta_2) e_1 [omega_2, -omega_1, 0 ...]``: the thesis moves the
-        term omega_1 omega_2 of the first row from one column to the other, which leaves N omega as it is.
-        """
-        return {2: -1.0, 3: +1.0}[self.joints] if self.coriolis_factorisation == "printed" else 0.0
-
     @cached_property
     def gravity_constants(self) -> Vector:
         """The n constants g_k = g (m_k r_k + L_k sum_{l>k} m_l), N m."""
@@ -130,18 +116,6 @@ class PlanarSerialArm(PlanarMechanism):
                 for k, link in enumerate(self.links)
             ]
         )
-
-    # ---- dynamics --------------------------------------------------------------------------------------------------
-
-    def coriolis_matrix(self, theta: ArrayLike, omega: ArrayLike) -> Matrix:
-        """Matrix N(theta, omega), n x n, friction included; ``coriolis_factorisation`` says which."""
-        N = super().coriolis_matrix(theta, omega)
-        if self.printed_coriolis_shift:
-            alpha, W = self.absolute(theta), self.absolute(omega)
-            shift = self.printed_coriolis_shift * self.inertia_constants[0, 1] * np.sin(alpha[1] - alpha[0])
-            N[0, 0] += shift * (W[1] - W[0])
-            N[0, 1] -= shift * W[0]
-        return N
 
     # ---- kinematics ------------------------------------------------------------------------------------------------
 

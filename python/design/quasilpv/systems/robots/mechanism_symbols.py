@@ -1,10 +1,9 @@
-"""A planar mechanism in symbols: the same closed form as `mechanism`, its premises and its descriptor model."""
+"""A planar mechanism in symbols: the same closed form as `dynamics`, its premises and its descriptor model."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import sympy as sp
 
@@ -12,9 +11,7 @@ from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.premise import Premise, PremiseKind
 from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.robots.arm_parameters import OperatingDomain
-
-if TYPE_CHECKING:
-    from quasilpv.systems.robots.mechanism import PlanarMechanism
+from quasilpv.systems.robots.dynamics import PlanarDynamics
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class SymbolicMechanism:
     stiffness_premises: tuple[sp.Expr, ...]
 
     @classmethod
-    def of(cls, mechanism: PlanarMechanism) -> SymbolicMechanism:
+    def of(cls, mechanism: PlanarDynamics) -> SymbolicMechanism:
         """Write the closed form of a mechanism."""
         n = mechanism.joints
         theta = sp.symbols(f"theta_1:{n + 1}", real=True)
@@ -56,10 +53,6 @@ class SymbolicMechanism:
 
         inertia = S.T * sp.Matrix(n, n, lambda k, j: sp.Float(D[k, j]) * sp.cos(alpha[k] - alpha[j])) * S
         coriolis = S.T * sp.Matrix(n, n, lambda k, j: sp.Float(D[k, j]) * sp.sin(alpha[k] - alpha[j]) * W[j]) * S
-        if mechanism.printed_coriolis_shift:
-            shift = sp.Float(mechanism.printed_coriolis_shift * D[0, 1]) * sp.sin(theta[1])
-            coriolis[0, 0] += shift * omega[1]
-            coriolis[0, 1] -= shift * omega[0]
         coriolis += sp.diag(*(sp.Float(f) for f in mechanism.friction_nm_s))
         sinc_terms = sp.diag(*(g * sp.sinc(a) for g, a in zip(gravity, alpha, strict=True)))
         return cls(
@@ -70,8 +63,8 @@ class SymbolicMechanism:
             S.T * sp.Matrix([g * sp.sin(a) for g, a in zip(gravity, alpha, strict=True)]),
             (S.T * sinc_terms * S).applyfunc(sp.expand),
             tuple(sp.cos(alpha[j] - alpha[k]) for k, j in _pairs(n)),
-            _velocity_premises(mechanism, theta, omega, alpha, W),
-            _stiffness_premises(mechanism, alpha, gravity),
+            tuple(W[link] * sp.sin(alpha[j] - alpha[k]) for k, j in _pairs(n) for link in (k, j)),
+            tuple(sp.sinc(angle) for angle in alpha) if mechanism.gravity_constants.any() else (),
         )
 
     def inertia_premises(self, domain: OperatingDomain) -> tuple[Premise, ...]:
@@ -123,39 +116,3 @@ class SymbolicMechanism:
 def _pairs(n: int) -> list[tuple[int, int]]:
     """All k < l, neighbours first."""
     return [(k, k + gap) for gap in range(1, n) for k in range(n - gap)]
-
-
-def _velocity_premises(
-    mechanism: PlanarMechanism,
-    theta: tuple[sp.Symbol, ...],
-    omega: tuple[sp.Symbol, ...],
-    alpha: list[sp.Expr],
-    W: list[sp.Expr],
-) -> tuple[sp.Expr, ...]:
-    sin = sp.sin
-    if mechanism.printed_coriolis_shift and mechanism.joints == 2:
-        c2 = sp.Float(mechanism.inertia_constants[0, 1])
-        return (c2 * omega[1] * sin(theta[1]), -c2 * omega[0] * sin(theta[1]))
-    if mechanism.printed_coriolis_shift:
-        (_, t2, t3), (w1, w2, w3) = theta, omega
-        tool = w1 + w2 + w3
-        return (
-            (2 * w1 + w2) * sin(t2),
-            w1 * sin(t2),
-            w1 * sin(t2 + t3),
-            (w1 + w2) * sin(t3),
-            tool * sin(t3),
-            tool * sin(t2 + t3),
-        )
-    return tuple(W[link] * sin(alpha[j] - alpha[k]) for k, j in _pairs(mechanism.joints) for link in (k, j))
-
-
-def _stiffness_premises(
-    mechanism: PlanarMechanism, alpha: list[sp.Expr], gravity: list[sp.Expr]
-) -> tuple[sp.Expr, ...]:
-    if not mechanism.gravity_constants.any():
-        return ()
-    sincs = [sp.sinc(angle) for angle in alpha]
-    if mechanism.printed_coriolis_shift and mechanism.joints == 2:
-        return (-gravity[0] * sincs[0] - gravity[1] * sincs[1], -gravity[1] * sincs[1])
-    return tuple(sincs)

@@ -8,10 +8,10 @@ from math import pi
 
 from quasilpv.errors import InputError, one_of
 from quasilpv.systems.robots.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
-from quasilpv.systems.robots.arms import PlanarSerialArm
 from quasilpv.systems.robots.fivebar import RhombicFiveBar
 from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
 from quasilpv.systems.robots.mechanism import PlanarMechanism
+from quasilpv.systems.robots.printed_arms import PrintedSerialArm
 from quasilpv.systems.robots.rolling_disc import InertiaSet, RollingDisc
 
 
@@ -27,9 +27,6 @@ class Robot:
         limits: what its actuators can deliver.
         payloads: the plants a robust design must cover.
         disturbance_frequency_rad_s: the fastest disturbance its controllers are tuned to reject.
-        printed_bandwidth_rad_s: triple pole of the gains that Dehak (2022) prints for PID and computed torque.
-        friction_bound_nm_s: largest viscous friction coefficient of a joint that `hinf-tracking` has to withstand,
-            N m s/rad; the model itself may have none.
     """
 
     id: str
@@ -39,8 +36,6 @@ class Robot:
     limits: ActuatorLimits
     payloads: PayloadSet
     disturbance_frequency_rad_s: float = 20.0
-    printed_bandwidth_rad_s: float = 15.0 * pi
-    friction_bound_nm_s: float = 10.0
 
     def __repr__(self) -> str:
         """Its name and its line of the listing."""
@@ -68,15 +63,15 @@ def robot(name: str) -> Robot:
     return known[name]
 
 
-def arm2() -> PlanarSerialArm:
+def arm2() -> PrintedSerialArm:
     """The 2-DoF arm of Dehak 2022, Table I.1, whose inertias are about the centres of mass (m L^2 / 12 of a rod)."""
     com_inertia = (0.3125, 0.1875)
     mass, com = (15.0, 9.0), 0.25
     links = tuple(Link(0.5, m, com, inertia + m * com**2) for m, inertia in zip(mass, com_inertia, strict=True))
-    return PlanarSerialArm("arm2", links, coriolis_factorisation="printed")
+    return PrintedSerialArm("arm2", links)
 
 
-def arm3() -> PlanarSerialArm:
+def arm3() -> PrintedSerialArm:
     """The 3-DoF arm of Dehak 2022, Table I.4, whose inertias are about the joint axes.
 
     The printed r_2 = .489 is 2.4/4.9 truncated: only that value gives all printed digits of the PID gains (III.55).
@@ -86,7 +81,7 @@ def arm3() -> PlanarSerialArm:
         Link(length_m=0.9, mass_kg=4.9, com_m=2.4 / 4.9, inertia_kg_m2=1.9),
         Link(length_m=0.8, mass_kg=4.2, com_m=0.4, inertia_kg_m2=1.3),
     )
-    return PlanarSerialArm("arm3", links, coriolis_factorisation="printed")
+    return PrintedSerialArm("arm3", links)
 
 
 def fivebar() -> FiveBarLinkage:
@@ -130,7 +125,7 @@ def _arm3() -> Robot:
     """The operating domain is the box of the default trajectories widened by 0.1 rad and 1.5 times their speeds.
 
     The payload is the perturbation of Dehak 2022, IV.5.1 (+40 % on links 1 and 2, +120 % on link 3, both mass and
-    centre of mass), the bound on friction that of III.3.3.
+    centre of mass).
     """
     return Robot(
         id="arm3",
@@ -183,7 +178,7 @@ def _fivebar() -> Robot:
 
     The payload is the perturbation of Dehak 2022, IV.5.2 (+40 % on the mass of the active links, +120 % on that of the
     passive ones, centres of mass as they are). Limits are a choice of this project: they leave room for the disturbance
-    of 100 N m, and for friction that takes 0.4 s to stop a link.
+    of 100 N m.
     """
     return Robot(
         id="fivebar",
@@ -196,8 +191,6 @@ def _fivebar() -> Robot:
         limits=ActuatorLimits(torque_nm=(150.0, 150.0), slew_nm_per_s=(1e6, 1e6)),
         payloads=PayloadSet(mass_scale=(1.4, 2.2), com_scale=(1.0, 1.0)),
         disturbance_frequency_rad_s=50.0,
-        printed_bandwidth_rad_s=80.0 * pi,
-        friction_bound_nm_s=0.01,
     )
 
 

@@ -4,7 +4,7 @@ Rolling without slipping, ``x_1 = r theta``, leaves one equation of the four of 
 
     (J_delta + M r^2) theta'' + b r^2 theta' + r^2 (k_1 + k_2 r^2 theta^2) theta = u
 
-`mechanism`'s G is here the torque of the spring. What is uncertain is the moment of inertia of the disc,
+G of `dynamics` is here the torque of the spring. What is uncertain is the moment of inertia of the disc,
 ``1/J_delta = 1/J + delta/r^2``: its set of plants scales J.
 """
 
@@ -21,7 +21,8 @@ from numpy.typing import ArrayLike
 
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.arm_parameters import PayloadSet
-from quasilpv.systems.robots.mechanism import Matrix, PlanarMechanism, Vector
+from quasilpv.systems.robots.dynamics import Matrix, Vector
+from quasilpv.systems.robots.mechanism import PlanarMechanism
 from quasilpv.systems.robots.mechanism_symbols import SymbolicMechanism
 
 
@@ -82,6 +83,11 @@ class RollingDisc(PlanarMechanism):
     def driven_inertia(self) -> Vector:
         """Its own."""
         return np.diag(self.inertia_constants)
+
+    @property
+    def holds_spring(self) -> bool:
+        """G is the torque of its spring."""
+        return True
 
     def gravity(self, theta: ArrayLike) -> Vector:
         """Torque of the spring, N m."""
