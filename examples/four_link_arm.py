@@ -26,12 +26,13 @@ from numpy.typing import ArrayLike, NDArray
 from quasilpv.artifact import Artifact
 from quasilpv.errors import InputError
 from quasilpv.experiments.result import TrackResult
-from quasilpv.experiments.track import TrackingExperiment, track
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.figures.animation import write_animation
 from quasilpv.figures.gallery import write_gallery
 from quasilpv.release import checked_artifact
-from quasilpv.scenarios import Sensors, sine_torques
-from quasilpv.synthesis import synthesise, without_compensation
+from quasilpv.scenarios import Sensors, TrackingExperiment, sine_torques
+from quasilpv.synthesis import DesignRequest, synthesise, without_compensation
 from quasilpv.systems.robots.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
 from quasilpv.systems.robots.arms import PlanarSerialArm
 from quasilpv.systems.robots.registry import Robot
@@ -153,13 +154,13 @@ def tracked(source: Robot, artifact: Artifact, folder: Path) -> TrackResult:
     """The seam in closed loop: C++ controller, arm with its full payload under IDA, 20-bit encoders, disturbance."""
     torque = sine_torques((30.0, 15.0), (20.0, 15.0), (10.0, 15.0), (3.0, 15.0))
     experiment = TrackingExperiment("seam", source, plan(ARM, SEAM, source.domain), torque)
-    return track(experiment, artifact, folder, plant="perturbed", sensors=Sensors())
+    return track(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()), folder)
 
 
 def main(folder: Path = Path("out/four-link-arm")) -> None:
     """Design, and track with and without compensation of the disturbance; print and draw."""
     source = robot()
-    results, design = [], synthesise(source)
+    results, design = [], synthesise(DesignRequest.of(source))
     for name, variant in (("without", without_compensation(design)), ("with", design)):
         artifact = checked_artifact(variant)  # refused unless its certificate and its robust gate hold
         result = tracked(source, artifact, folder / name)

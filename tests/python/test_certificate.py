@@ -26,7 +26,7 @@ from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import InputError
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import DesignRequest, Specification
 
 FloatArray = npt.NDArray[np.float64]
 Document = dict[str, Any]
@@ -38,8 +38,8 @@ seeds = st.integers(0, 2**32 - 1)
 @cache
 def kept(kind: str) -> Document:
     if kind == "dob-acceleration":
-        return release("arm3").artifact.content()
-    return release("arm2", kind, Specification(rate_hz=4000.0)).artifact.content()
+        return release(DesignRequest.of("arm3")).artifact.content()
+    return release(DesignRequest.of("arm2", kind, Specification(rate_hz=4000.0))).artifact.content()
 
 
 def document_of(kind: str) -> Document:
@@ -281,7 +281,7 @@ def test_when_the_witness_is_absurd_expect_a_refusal_and_no_overflow(kind: str, 
 
 def test_when_a_law_makes_no_claim_expect_an_input_error_that_names_those_that_do() -> None:
     with pytest.raises(InputError, match=r"pid.*dob-acceleration, dob-torque"):
-        verify(release("arm2", "pid").artifact.content())
+        verify(release(DesignRequest.of("arm2", "pid")).artifact.content())
 
 
 def test_when_the_tables_have_different_boxes_expect_an_input_error() -> None:

@@ -17,8 +17,7 @@ import quasilpv as ql
 from quasilpv import chain
 from quasilpv.artifact import write_artifact
 from quasilpv.chain import ArtifactLike, Design, Simulation
-from quasilpv.experiments.track import TrackingExperiment
-from quasilpv.scenarios import read_scenario, sine_torques
+from quasilpv.scenarios import TrackingExperiment, read_scenario, sine_torques, tracking_experiment
 from quasilpv.synthesis import CONTROLLERS
 from quasilpv.systems.robots.arms import PlanarSerialArm
 from quasilpv.systems.robots.registry import robots
@@ -162,7 +161,7 @@ def test_a_run_keeps_its_files_where_it_is_told_and_nowhere_else(
 
 def test_the_disturbance_of_a_scenario_is_its_own_unless_another_is_stated(tmp_path: Path) -> None:
     artifact = ql.design("arm3", law="ctc").release()
-    registered = TrackingExperiment.registered("serial-circle")
+    registered = tracking_experiment("serial-circle")
     for torque, expected in ((None, registered.external_torque), ((), ())):
         ql.simulate(artifact, "serial-circle", external_torque=torque, folder=tmp_path)
         assert read_scenario(tmp_path / "scenario.json").external_torque == expected

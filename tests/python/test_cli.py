@@ -21,6 +21,7 @@ from quasilpv.documents.canonical import canonical_json, parse_document, with_ha
 from quasilpv.errors import ClaimError, FaultStop, InfeasibleError, PlantError, QuasilpvError
 from quasilpv.experiments.result import Variant
 from quasilpv.release import release
+from quasilpv.synthesis import DesignRequest
 from quasilpv.telemetry import read_log
 
 HEAVY = ("sympy", "matplotlib", "scipy", "clarabel", "cvxpy", "joblib")
@@ -348,7 +349,7 @@ def test_when_a_path_is_followed_expect_the_robot_of_the_artifact_and_never_anot
 ) -> None:
     path = {"name": "ray", "start": [0.0, -0.22], "segments": [{"line": {"to": [0.02, -0.22], "duration_s": 0.3}}]}
     (tmp_path / "ray.json").write_text(json.dumps(path), encoding="utf-8")
-    write_artifact(tmp_path, release("fivebar", "pid").artifact)
+    write_artifact(tmp_path, release(DesignRequest.of("fivebar", "pid")).artifact)
     of_the_artifact = ("track", "--trajectory", "ray.json", "--artifact", "artifact.json")
     (row,) = json.loads(design(*of_the_artifact, "--json").out)
     assert (row["scenario"], row["controller"]) == ("ray", "pid")

@@ -22,7 +22,7 @@ from quasilpv.cli import run
 from quasilpv.cli.usage import LARGEST_WRITTEN, number
 from quasilpv.cli.verbs import VERBS
 from quasilpv.release import release
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import DesignRequest, Specification
 
 NO_NUMBERS = ("nan", "inf", "-inf", "1e308", "-1e308", "1e18", "", "0x10", "\udcff")
 EXTREMES = ("-1", "0", "1e-300", "1e15")
@@ -78,7 +78,7 @@ class LegitimateError(Exception):
 @pytest.fixture(scope="module")
 def artifact(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pid")
-    return write_artifact(folder, release("arm3", "pid", Specification()).artifact)[0]
+    return write_artifact(folder, release(DesignRequest.of("arm3", "pid", Specification())).artifact)[0]
 
 
 @pytest.fixture(autouse=True)

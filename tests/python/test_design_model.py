@@ -20,7 +20,7 @@ from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import InputError
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import to_artifact
-from quasilpv.synthesis import Specification, synthesise
+from quasilpv.synthesis import DesignRequest, Specification, synthesise
 from quasilpv.systems.robots.registry import robot
 from reference.gated_arms import arm4, artifact_document, multiple_pole_loop
 
@@ -36,7 +36,7 @@ def acceleration(name: str) -> Document:
 
 @cache
 def _torque() -> Document:
-    design = synthesise(robot("arm2"), "dob-torque", Specification(rate_hz=4000.0))
+    design = synthesise(DesignRequest.of("arm2", "dob-torque", Specification(rate_hz=4000.0)))
     return to_artifact(design).content()
 
 

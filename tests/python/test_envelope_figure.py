@@ -14,12 +14,13 @@ from quasilpv import _runtime
 from quasilpv.artifact import Artifact, read_artifact, summary, write_artifact
 from quasilpv.artifact.envelope import OperatingEnvelope
 from quasilpv.experiments.result import Variant
-from quasilpv.experiments.track import TrackingExperiment, track
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.figures.envelope import envelope_figure
 from quasilpv.figures.gallery import write_gallery
 from quasilpv.release import release
-from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification
+from quasilpv.scenarios import Sensors, tracking_experiment
+from quasilpv.synthesis import DesignRequest, Specification
 from reference.runs import synthetic_result
 from test_figures import assert_readable
 
@@ -28,7 +29,7 @@ KINDS = ("dob-acceleration", "dob-torque")
 
 @cache
 def artifact(kind: str) -> Artifact:
-    return release("arm2", kind, Specification(rate_hz=4000.0)).artifact
+    return release(DesignRequest.of("arm2", kind, Specification(rate_hz=4000.0))).artifact
 
 
 def envelope(kind: str) -> OperatingEnvelope:
@@ -57,7 +58,7 @@ def test_when_an_artifact_is_inspected_expect_levels_and_bounds_without_matrices
 
 
 def test_when_a_law_has_no_envelope_expect_none() -> None:
-    baseline = release("arm2", "pid").artifact
+    baseline = release(DesignRequest.of("arm2", "pid")).artifact
     assert OperatingEnvelope.of(baseline) is None
     assert summary(baseline)["envelope"] is None
 
@@ -100,10 +101,12 @@ def test_when_the_run_has_an_envelope_expect_its_figure_in_the_gallery_and_else_
 def test_when_encoders_are_exact_expect_the_settled_run_in_its_peak_set_and_beyond_it_otherwise(
     tmp_path: Path,
 ) -> None:
-    design = release("arm3", "dob-acceleration", Specification()).artifact
-    square = TrackingExperiment.registered("serial-square")
+    design = release(DesignRequest.of("arm3", "dob-acceleration", Specification())).artifact
+    square = tracking_experiment("serial-square")
     for bits, is_inside in ((0, True), (20, False)):
-        result = track(square, design, tmp_path, plant="perturbed", sensors=Sensors(encoder_bits=bits), log=False)
+        result = track(
+            RunSetup(square, design, plant="perturbed", sensors=Sensors(encoder_bits=bits), log=False), tmp_path
+        )
         assert result.envelope is not None
         peak_set, run = result.envelope.peak, result.run
         errors = np.stack(

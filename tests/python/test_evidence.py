@@ -26,7 +26,7 @@ from quasilpv.cli import run
 from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import ClaimError, InfeasibleError, InputError
 from quasilpv.release import checked_artifact, to_artifact
-from quasilpv.synthesis import CONTROLLERS, synthesise
+from quasilpv.synthesis import CONTROLLERS, DesignRequest, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.registry import robot, robots
 
@@ -36,7 +36,7 @@ EVERY = [(entry.id, controller) for entry in robots() for controller in CONTROLL
 
 @cache
 def design(robot_id: str, controller: str) -> TrackingDesign:
-    return synthesise(robot(robot_id), controller)
+    return synthesise(DesignRequest.of(robot_id, controller))
 
 
 def content(robot_id: str, controller: str) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import pytest
 from quasilpv.artifact import write_artifact
 from quasilpv.errors import InputError
 from quasilpv.release import release
-from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification
+from quasilpv.synthesis import DEFAULT_CONTROLLER, DesignRequest, Specification
 from two_processes import Experiment, finish
 
 pytest_plugins = ["two_processes"]
@@ -26,7 +26,7 @@ def flipped(data: bytes, bit: int) -> bytes:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Both twins of the default design."""
     folder = tmp_path_factory.mktemp("default")
-    write_artifact(folder, release("arm3", DEFAULT_CONTROLLER, Specification()).artifact)
+    write_artifact(folder, release(DesignRequest.of("arm3", DEFAULT_CONTROLLER, Specification())).artifact)
     return folder
 
 

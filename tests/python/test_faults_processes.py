@@ -19,7 +19,7 @@ import pytest
 from quasilpv.artifact import write_artifact
 from quasilpv.release import release
 from quasilpv.scenarios import SineTorque, build_scenario, write_scenario
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 from quasilpv.trajectories import rest
 from quasilpv.trajectories.document import write_trajectory
@@ -293,7 +293,7 @@ def test_F17_when_a_five_bar_is_pushed_through_its_singularity_expect_exit_6_and
         ),
         initial_angle_rad=(-0.8, 0.8),
     )
-    write_artifact(experiment.folder, release("fivebar", "ctc-dob", Specification()).artifact)
+    write_artifact(experiment.folder, release(DesignRequest.of("fivebar", "ctc-dob", Specification())).artifact)
     write_trajectory(experiment.folder / "trajectory.json", trajectory)
     write_scenario(experiment.folder / "scenario.json", scenario)
     experiment.start(experiment.controller_command())

@@ -23,25 +23,25 @@ from quasilpv.certificate.gate_data import loop_data
 from quasilpv.certificate.gate_margin import inertia_margin
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
-from quasilpv.experiments.track import TrackingExperiment
 from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.torque_law import TorqueLaw
 from quasilpv.release import release
-from quasilpv.synthesis import Specification
+from quasilpv.scenarios import tracking_experiment
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.fivebar import RhombicFiveBar
 from quasilpv.systems.robots.registry import robot
 from reference.five_bar_run import sines, track
 from reference.gated_arms import artifact_document, full_map, multiple_pole_loop
 
 ROBOT = robot("fivebar")
-SPIRAL = TrackingExperiment.registered("fivebar-spiral").trajectory
+SPIRAL = tracking_experiment("fivebar-spiral").trajectory
 FREQUENCY = ROBOT.disturbance_frequency_rad_s
 
 
 @cache
 def released(rate_hz: float, controller: str = "dob-acceleration", *, compensated: bool = True) -> Artifact:
     specification = Specification(rate_hz=rate_hz, disturbance_frequency_rad_s=FREQUENCY)
-    return release("fivebar", controller, specification, disturbance_compensation=compensated).artifact
+    return release(DesignRequest.of("fivebar", controller, specification, compensated=compensated)).artifact
 
 
 def rms(artifact: Artifact, terms: list[tuple[float, float]], duration_s: float) -> np.ndarray:

@@ -24,7 +24,7 @@ from quasilpv.certificate.gate_motion import InertiaDisc
 from quasilpv.certificate.gate_rationals import to_floats
 from quasilpv.errors import ClaimError, InputError
 from quasilpv.release import checked_artifact, to_artifact
-from quasilpv.synthesis import synthesise
+from quasilpv.synthesis import DesignRequest, synthesise
 from quasilpv.synthesis.acceleration import moving_inertia as design
 from quasilpv.synthesis.acceleration.moving_lyapunov import delayed_loop, known_signals, moving_lyapunov
 from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw
@@ -122,7 +122,7 @@ def test_when_postures_and_payloads_change_at_every_sample_expect_the_shipped_fu
 
 @pytest.mark.full
 def test_when_an_arm_with_three_links_moves_and_changes_its_load_expect_the_shipped_function_to_decrease() -> None:
-    document = to_artifact(synthesise(robot("arm3"), "dob-moving")).content()
+    document = to_artifact(synthesise(DesignRequest.of("arm3", "dob-moving"))).content()
     assert robust_gate(document).motion is True
     require_decrease(document, "arm3", 200)
 

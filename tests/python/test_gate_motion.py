@@ -22,7 +22,7 @@ from quasilpv.certificate.gate_range import InertiaPair
 from quasilpv.certificate.gate_rationals import to_float
 from quasilpv.errors import InputError
 from quasilpv.release import to_artifact
-from quasilpv.synthesis import Specification, synthesise
+from quasilpv.synthesis import DesignRequest, Specification, synthesise
 from quasilpv.synthesis.acceleration.moving_inertia import needed_disc
 from quasilpv.systems.robots.registry import robot
 from reference.gated_arms import artifact_document, full_map, moving_five_bar, multiple_pole_loop, quotients
@@ -134,7 +134,9 @@ def test_when_the_claim_is_not_true_expect_the_gate_not_passed(member: str, chan
 
 def test_when_the_default_law_is_asked_about_its_own_range_expect_no_common_function() -> None:
     # Its bandwidth uses up the inertia margin: one joint whose mu moves within the needed range has no common V.
-    document = to_artifact(synthesise(robot("fivebar"), specification=Specification(rate_hz=2000.0))).content()
+    document = to_artifact(
+        synthesise(DesignRequest.of("fivebar", specification=Specification(rate_hz=2000.0)))
+    ).content()
     needed = robust_gate(document).needed
     assert needed is not None
     low, high = 1 / needed.highest, 1 / needed.lowest

@@ -24,7 +24,7 @@ from quasilpv.errors import InputError
 from quasilpv.figures.growth import growth_figure
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 from reference.step import DobTorque, OutputStage, Sample
 
@@ -49,7 +49,7 @@ ANSWER = {
 
 @cache
 def kept() -> Document:
-    return release("arm2", "dob-torque", Specification(rate_hz=RATE_HZ)).artifact.content()
+    return release(DesignRequest.of("arm2", "dob-torque", Specification(rate_hz=RATE_HZ))).artifact.content()
 
 
 def document() -> Document:
@@ -256,7 +256,7 @@ def test_when_a_premise_leaves_its_box_expect_the_field_named() -> None:
 
 def test_when_a_law_has_no_gate_expect_those_that_have_one_named() -> None:
     with pytest.raises(InputError, match=r"pid.*dob-acceleration, dob-torque"):
-        gate(release("arm2", "pid").artifact.content())
+        gate(release(DesignRequest.of("arm2", "pid")).artifact.content())
 
 
 # ---- the command and the figure --------------------------------------------------------------------------------------

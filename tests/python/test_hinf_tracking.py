@@ -21,11 +21,12 @@ from quasilpv.conditions.tracking.iii10 import tracking_condition
 from quasilpv.conditions.tracking.iii10_reduced import UnknownTorques, reduced_tracking_condition
 from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import InfeasibleError
-from quasilpv.experiments.track import TrackingExperiment, track
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
-from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification, hinf
+from quasilpv.scenarios import Sensors, tracking_experiment
+from quasilpv.synthesis import DesignRequest, Specification, hinf
 from quasilpv.synthesis.hinf import friction_bound_nm_s, hinf_tracking, unknown_torques
 from quasilpv.synthesis.torque.schedule import full_schedule
 from quasilpv.systems.robots.registry import robot
@@ -41,7 +42,7 @@ CONDITION = "quasilpv.conditions.tracking.iii10_reduced"
 
 @cache
 def kept(robot_id: str = "arm2") -> Document:
-    return release(robot_id, "hinf-tracking", Specification(rate_hz=RATE_HZ)).artifact.content()
+    return release(DesignRequest.of(robot_id, "hinf-tracking", Specification(rate_hz=RATE_HZ))).artifact.content()
 
 
 # ---- the reduced theorem ---------------------------------------------------------------------------------------------
@@ -99,7 +100,7 @@ def test_when_states_and_payloads_are_drawn_expect_the_torque_as_a_sum_of_unknow
 def test_when_the_checker_bounds_the_unknown_terms_itself_expect_those_of_the_design() -> None:
     for robot_id in ("arm2", "arm3", "fivebar"):
         arm = robot(robot_id)
-        content = release(robot_id, "pid").artifact.content()
+        content = release(DesignRequest.of(robot_id, "pid")).artifact.content()
         content["witness"] = {"feedback": {"friction_nm_s": friction_bound_nm_s(arm)}}
         terms, unknown = unknown_terms(content), unknown_torques(arm)
         assert len(terms) == len(unknown.radius)
@@ -281,7 +282,7 @@ def test_when_the_bound_on_friction_is_that_of_the_robot_expect_a_design_for_the
 ) -> None:
     """With the 10 N m s of the arms, 2500 times its inertia per second, no gain of this size passes the gate."""
     specification, entry = Specification(rate_hz=RATE_HZ, disturbance_frequency_rad_s=50.0), robot("fivebar")
-    content = release("fivebar", "hinf-tracking", specification).artifact.content()
+    content = release(DesignRequest.of("fivebar", "hinf-tracking", specification)).artifact.content()
     assert content["verification"]["certificate"]["verified"]
     assert content["verification"]["gate"]["passed"]
     assert content["witness"]["feedback"]["friction_nm_s"] == friction_bound_nm_s(entry)
@@ -297,9 +298,9 @@ def test_when_the_robot_holds_a_spring_expect_a_refusal() -> None:
 
 @pytest.mark.full
 def test_when_the_arm_tracks_the_square_expect_millimetres_and_both_twins_of_the_artifact(tmp_path: Path) -> None:
-    artifact = release("arm3", "hinf-tracking", Specification(rate_hz=RATE_HZ)).artifact
+    artifact = release(DesignRequest.of("arm3", "hinf-tracking", Specification(rate_hz=RATE_HZ))).artifact
     assert canonical_json(artifact.to_document()) == canonical_json(with_hash(artifact.content()))
-    experiment = TrackingExperiment.registered("serial-square")
+    experiment = tracking_experiment("serial-square")
     for plant in ("nominal", "perturbed"):
-        result = track(experiment, artifact, tmp_path / plant, plant=plant, sensors=Sensors())  # type: ignore[arg-type]
+        result = track(RunSetup(experiment, artifact, plant=plant, sensors=Sensors()), tmp_path / plant)  # type: ignore[arg-type]
         assert max(result.metrics.rms_x_m, result.metrics.rms_y_m) < 8e-3

@@ -14,15 +14,20 @@ from quasilpv.cli.results import print_warnings
 from quasilpv.errors import ClaimError
 from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import Variant
-from quasilpv.experiments.track import (
-    TrackingExperiment,
-    disturbance_beyond_limits,
-    start_outside_domain,
-    track,
-)
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import disturbance_beyond_limits, start_outside_domain, track
 from quasilpv.release import checked_artifact, to_artifact
-from quasilpv.scenarios import EXTERNAL_TORQUE, Sensors, build_scenario, motions_of, sine_torques, tracking_tasks
-from quasilpv.synthesis import synthesise
+from quasilpv.scenarios import (
+    EXTERNAL_TORQUE,
+    Sensors,
+    TrackingExperiment,
+    build_scenario,
+    motions_of,
+    sine_torques,
+    tracking_experiment,
+    tracking_experiments,
+)
+from quasilpv.synthesis import DesignRequest, synthesise
 from quasilpv.synthesis.actuator_demand import Motion, largest_gravity, predicted_increments, unmet_demands
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.registry import robot, robots
@@ -40,7 +45,7 @@ def limited(design: TrackingDesign, **limits: tuple[float, ...]) -> TrackingDesi
 
 @pytest.fixture(scope="module")
 def pid() -> TrackingDesign:
-    return synthesise(ARM3, "pid")
+    return synthesise(DesignRequest.of(ARM3, "pid"))
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +157,7 @@ def test_a_run_at_a_limit_or_outside_the_box_is_warned_of_and_a_healthy_one_is_n
 def test_when_actuators_are_too_slow_for_the_run_expect_the_share_in_its_row(
     pid: TrackingDesign, tmp_path: Path
 ) -> None:
-    short = replace(TrackingExperiment.registered("serial-square"), external_torque=EXTERNAL_TORQUE)
+    short = replace(tracking_experiment("serial-square"), external_torque=EXTERNAL_TORQUE)
     trajectory = rest("hold", 3, 0.1)
     shifted = trajectory.coefficients.copy()
     shifted[:, :, 0] = short.trajectory.evaluate(0.0).angle
@@ -160,7 +165,9 @@ def test_when_actuators_are_too_slow_for_the_run_expect_the_share_in_its_row(
     shares = []
     for slew in (1e6, 5e3):
         artifact = to_artifact(limited(pid, slew_nm_per_s=(slew,) * 3))
-        result = track(experiment, artifact, tmp_path / f"{slew:g}", plant="perturbed", sensors=Sensors(), log=False)
+        result = track(
+            RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors(), log=False), tmp_path / f"{slew:g}"
+        )
         shares.append(result.row()["share_at_limit"])
     assert shares[0] == 0.0
     assert shares[1] > 0.5
@@ -173,21 +180,21 @@ def test_no_experiment_is_disturbed_unless_it_says_so() -> None:
     hold = rest("hold", 3, 1.0)
     assert TrackingExperiment("hold", ARM3, hold).external_torque == ()
     assert build_scenario(ARM3, hold).external_torque == ()
-    for task in tracking_tasks():
-        assert (task.external_torque == EXTERNAL_TORQUE) == task.id.startswith("serial-")
+    for one in tracking_experiments():
+        assert (one.external_torque == EXTERNAL_TORQUE) == one.name.startswith("serial-")
 
 
 def test_a_disturbance_beyond_the_limits_and_a_start_outside_the_domain_are_said(pid: TrackingDesign) -> None:
     artifact: Artifact = to_artifact(pid)
     experiment = replace(
-        TrackingExperiment.registered("serial-square"),
+        tracking_experiment("serial-square"),
         external_torque=sine_torques((450.0, 15.0), (1300.0, 15.0), (300.0, 15.0)),
     )
     said = disturbance_beyond_limits(experiment, artifact)
     assert said is not None
     assert "1300 N m on joint 1" in said
     assert "1200 N m" in said
-    registered = TrackingExperiment.registered("serial-square")
+    registered = tracking_experiment("serial-square")
     assert disturbance_beyond_limits(registered, artifact) is None
     assert start_outside_domain(registered, artifact) is None
     turned = tuple(registered.trajectory.evaluate(0.0).angle + np.array([0.0, 0.0, 2.0 * np.pi]))

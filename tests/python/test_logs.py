@@ -23,10 +23,11 @@ from quasilpv.errors import InputError
 from quasilpv.experiments.hil import run_over_lcm
 from quasilpv.experiments.logged import logged_result, mechanism_of
 from quasilpv.experiments.result import TrackResult
-from quasilpv.experiments.track import TrackingExperiment, track
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.release import release
-from quasilpv.scenarios import EXTERNAL_TORQUE, Sensors, build_scenario
-from quasilpv.synthesis import Specification
+from quasilpv.scenarios import EXTERNAL_TORQUE, Sensors, TrackingExperiment, build_scenario, tracking_experiment
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot, robots
 from quasilpv.telemetry import LOG_NAME, Event, RunLog, latest_log, read_events, read_log, write_events
 from quasilpv.telemetry.codes import event_in_words
@@ -44,14 +45,14 @@ SAMPLES = 300
 
 @pytest.fixture(scope="module")
 def artifact() -> Artifact:
-    return release("arm3", "ctc-dob", Specification()).artifact
+    return release(DesignRequest.of("arm3", "ctc-dob", Specification())).artifact
 
 
 @pytest.fixture(scope="module")
 def experiment() -> TrackingExperiment:
     """A quick one: the arm holds a posture against the disturbance."""
     still = rest("hold", 3, SAMPLES * 1e-3)
-    posture = TrackingExperiment.registered("serial-square").trajectory.evaluate(0.0).angle
+    posture = tracking_experiment("serial-square").trajectory.evaluate(0.0).angle
     coefficients = still.coefficients + np.eye(1, 6)[None] * posture[None, :, None]
     trajectory = replace(still, coefficients=coefficients)
     return TrackingExperiment("hold", robot("arm3"), trajectory, EXTERNAL_TORQUE)
@@ -63,7 +64,7 @@ def tracked(
 ) -> tuple[TrackResult, Path]:
     """A run in this process, and its log."""
     folder = tmp_path_factory.mktemp("log")
-    return track(experiment, artifact, folder, plant="perturbed", sensors=Sensors()), folder / LOG_NAME
+    return track(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()), folder), folder / LOG_NAME
 
 
 COMPARED = (
@@ -254,9 +255,9 @@ def test_when_a_run_is_read_back_from_its_log_expect_every_sample_and_number(
 def test_when_a_run_is_repeated_expect_the_same_log_byte_for_byte(
     tracked: tuple[TrackResult, Path], artifact: Artifact, experiment: TrackingExperiment, tmp_path: Path
 ) -> None:
-    track(experiment, artifact, tmp_path, plant="perturbed", sensors=Sensors())
+    track(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()), tmp_path)
     assert (tmp_path / LOG_NAME).read_bytes() == tracked[1].read_bytes()
-    track(experiment, artifact, tmp_path / "unlogged", plant="perturbed", sensors=Sensors(), log=False)
+    track(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors(), log=False), tmp_path / "unlogged")
     assert not (tmp_path / "unlogged" / LOG_NAME).exists()
 
 
@@ -356,7 +357,7 @@ def test_when_the_controller_was_in_fault_expect_the_replay_to_end_there(
 def test_when_the_artifact_is_another_one_expect_exit_2_and_one_line(
     tracked: tuple[TrackResult, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    other, _ = write_artifact(tmp_path, release("arm3", "pid", Specification()).artifact)
+    other, _ = write_artifact(tmp_path, release(DesignRequest.of("arm3", "pid", Specification())).artifact)
     assert run(["log", "replay", str(tracked[1]), "--artifact", str(other)]) == 2
     line = capsys.readouterr().err
     assert len(line.splitlines()) == 1
@@ -522,7 +523,7 @@ def test_when_two_processes_talk_expect_their_traffic_in_the_log_and_a_replay_bi
 ) -> None:
     monkeypatch.setenv("PATH", str(Path(executable("qlpv-simulator")).parent), prepend=":")
     executable("qlpv-controller")
-    run_over_lcm(experiment, artifact, tmp_path, plant="perturbed", sensors=Sensors(), mode="lockstep")
+    run_over_lcm(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()), tmp_path, mode="lockstep")
     heard, made = read_log(tmp_path / LOG_NAME), read_log(tracked[1])
     for channel, own in COMPARED:
         theirs, ours = heard[channel].samples, made[channel].samples

@@ -7,7 +7,7 @@ import pytest
 
 from quasilpv.loops.loop_grid import configurations
 from quasilpv.release import checked_artifact
-from quasilpv.synthesis import Specification, synthesise
+from quasilpv.synthesis import DesignRequest, Specification, synthesise
 from quasilpv.synthesis.acceleration.inertia_range import needed_inertia_range
 from quasilpv.synthesis.acceleration.lumped_premises import lumped_acceleration_law, with_premises_lumped
 from quasilpv.synthesis.inertia_schedule import schedule_of
@@ -21,7 +21,7 @@ PARTITIONS = [(0, 1, 2), (1, 2), (2,), ()]
 
 @cache
 def default_design() -> TrackingDesign:
-    return synthesise(ARM)
+    return synthesise(DesignRequest.of(ARM))
 
 
 @pytest.mark.parametrize("chosen", PARTITIONS)

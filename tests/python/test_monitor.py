@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from quasilpv.artifact import Artifact
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
+from quasilpv.experiments.setup import PlantKind, RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.release import release
-from quasilpv.scenarios import Sensors, SineTorque
+from quasilpv.scenarios import Sensors, SineTorque, TrackingExperiment
+from quasilpv.synthesis import DesignRequest
 from quasilpv.systems.robots.registry import robot
 from quasilpv.telemetry import LOG_NAME, read_log
 from quasilpv.telemetry.message_types import Records
@@ -30,7 +32,7 @@ def five_bar_telemetry(
     hold = Trajectory("hold", np.array([0.0, HOLD_S]), coefficients)
     start = tuple((POSTURE + offset).tolist())
     experiment = TrackingExperiment("hold", robot("fivebar"), hold, torques, start, (0.0, 0.0))
-    track(experiment, Artifact.from_document(moving_five_bar()), folder, plant=plant, sensors=sensors)
+    track(RunSetup(experiment, Artifact.from_document(moving_five_bar()), plant=plant, sensors=sensors), folder)
     return read_log(folder / LOG_NAME)["telemetry"].samples
 
 
@@ -72,9 +74,9 @@ def test_when_the_plant_is_let_go_beside_its_posture_expect_never_more_than_v_at
 
 
 def test_when_a_run_is_logged_in_this_process_expect_the_monitor_in_its_telemetry(tmp_path: Path) -> None:
-    artifact = release("arm3", "pid").artifact
+    artifact = release(DesignRequest.of("arm3", "pid")).artifact
     hold = TrackingExperiment("hold", robot("arm3"), rest("hold", 3, 0.05))
-    track(hold, artifact, tmp_path, plant="nominal", sensors=Sensors())
+    track(RunSetup(hold, artifact, plant="nominal", sensors=Sensors()), tmp_path)
     samples = read_log(tmp_path / LOG_NAME)["telemetry"].samples
     np.testing.assert_allclose(samples["membership_sum"], 1.0, atol=1e-14)
     assert np.all(samples["premise_excess"] >= 0.0)

@@ -22,11 +22,12 @@ import pytest
 from quasilpv.artifact import write_artifact
 from quasilpv.cli import run
 from quasilpv.cli.verbs import VERBS
-from quasilpv.experiments.track import TrackingExperiment, track
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.files import claim_file, claim_folder, one_command
 from quasilpv.release import release
-from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification
+from quasilpv.scenarios import Sensors, TrackingExperiment
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 from quasilpv.telemetry import LOG_NAME
 from quasilpv.trajectories import rest
@@ -38,9 +39,9 @@ READER_LEFT = 141
 def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """An artifact with everything that can be checked, a log, and the description of a robot."""
     folder = tmp_path_factory.mktemp("inputs")
-    artifact = release("arm2", "dob-acceleration", Specification()).artifact
+    artifact = release(DesignRequest.of("arm2", "dob-acceleration", Specification())).artifact
     experiment = TrackingExperiment("hold", robot("arm2"), rest("hold", 2, 0.05), external_torque=())
-    track(experiment, artifact, folder, plant="nominal", sensors=Sensors())
+    track(RunSetup(experiment, artifact, plant="nominal", sensors=Sensors()), folder)
     described = folder / ROBOT.name
     described.write_bytes(ROBOT.read_bytes())
     artifact_path = write_artifact(folder, artifact)[0]

@@ -15,9 +15,10 @@ import pytest
 
 from quasilpv import _runtime
 from quasilpv.experiments.designs import kept_design
-from quasilpv.experiments.track import TrackingExperiment, write_run_files
-from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import write_run_files
+from quasilpv.scenarios import Sensors, tracking_experiment
+from quasilpv.synthesis import DesignRequest, Specification
 
 ROOT = Path(__file__).parents[2]
 BUILT = ROOT / "build" / "release"
@@ -151,9 +152,9 @@ def downstream(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_when_another_project_runs_the_loop_of_the_installed_library_expect_the_run_of_the_bindings(
     downstream: Path, tmp_path: Path
 ) -> None:
-    experiment = TrackingExperiment.registered("serial-square")
-    artifact = kept_design("arm3", "pid", Specification(), folder=tmp_path / "cache")
-    files = write_run_files(tmp_path, experiment, artifact, plant="perturbed", sensors=Sensors())
+    experiment = tracking_experiment("serial-square")
+    artifact = kept_design(DesignRequest.of("arm3", "pid", Specification()), folder=tmp_path / "cache")
+    files = write_run_files(tmp_path, RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()))
     said = run(downstream, files.artifact, files.trajectory, files.scenario, cwd=tmp_path)
     columns = _runtime.run_closed_loop(
         _runtime.Artifact.load(str(files.artifact)),

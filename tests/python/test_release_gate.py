@@ -17,23 +17,22 @@ from quasilpv.cli import run
 from quasilpv.errors import ClaimError
 from quasilpv.experiments import designs
 from quasilpv.release import checked_artifact, release
-from quasilpv.synthesis import Specification, synthesise
+from quasilpv.synthesis import DesignRequest, Specification, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.robots.registry import robot
 from test_architecture import loaded_with, room_of
 
 
 @cache
 def designed(controller: str = "dob-acceleration") -> TrackingDesign:
     if controller == "dob-torque":
-        return synthesise(robot("arm2"), controller, Specification(rate_hz=4000.0))
-    return synthesise(robot("arm3"), controller)
+        return synthesise(DesignRequest.of("arm2", controller, Specification(rate_hz=4000.0)))
+    return synthesise(DesignRequest.of("arm3", controller))
 
 
 @cache
 def on_the_edge() -> TrackingDesign:
     """A design that uses its whole margin: its needed range touches both ends, so no proof can be inside."""
-    return synthesise(robot("arm3"), specification=Specification(margin_spare=1.0))
+    return synthesise(DesignRequest.of("arm3", specification=Specification(margin_spare=1.0)))
 
 
 def evidence(artifact: Artifact) -> Mapping[str, Any]:
@@ -91,7 +90,7 @@ def test_when_the_specified_delay_is_longer_expect_the_gate_to_be_held_to_it() -
 
 
 def test_when_a_baseline_is_released_expect_no_claim() -> None:
-    assert release("arm3", "pid").artifact.verification is None
+    assert release(DesignRequest.of("arm3", "pid")).artifact.verification is None
 
 
 # ---- what is not -----------------------------------------------------------------------------------------------------
@@ -131,9 +130,9 @@ def asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[tuple[str, Sp
     """The command in an empty folder, its designs made before; what it asks for is collected."""
     calls: list[tuple[str, Specification]] = []
 
-    def instead(_robot: object, controller: str, specification: Specification, **_options: object) -> TrackingDesign:
-        calls.append((controller, specification))
-        return on_the_edge() if specification.margin_spare == 1.0 else designed(controller)
+    def instead(request: DesignRequest, **_options: object) -> TrackingDesign:
+        calls.append((request.controller, request.specification))
+        return on_the_edge() if request.specification.margin_spare == 1.0 else designed(request.controller)
 
     monkeypatch.setattr("quasilpv.release.synthesise", instead)
     monkeypatch.chdir(tmp_path)
@@ -212,7 +211,9 @@ def test_when_any_room_a_release_depends_on_changes_expect_kept_designs_to_be_st
 @pytest.mark.usefixtures("asked")
 def test_when_a_design_fails_its_gate_expect_it_neither_kept_nor_returned(tmp_path: Path) -> None:
     with pytest.raises(ClaimError, match="not released"):
-        designs.kept_design("arm3", "dob-acceleration", Specification(margin_spare=1.0), folder=tmp_path / "cache")
+        designs.kept_design(
+            DesignRequest.of("arm3", "dob-acceleration", Specification(margin_spare=1.0)), folder=tmp_path / "cache"
+        )
     assert not (tmp_path / "cache").exists()
-    kept = designs.kept_design("arm3", "dob-acceleration", Specification(), folder=tmp_path / "cache")
+    kept = designs.kept_design(DesignRequest.of("arm3", "dob-acceleration", Specification()), folder=tmp_path / "cache")
     assert evidence(kept)["gate"]["passed"] is True

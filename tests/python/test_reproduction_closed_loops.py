@@ -33,7 +33,7 @@ from quasilpv.reproduction.closed_loops import (
 from quasilpv.reproduction.constraints import closure_along, rolling_along
 from quasilpv.reproduction.tracking_claims import RATE_HZ, Printed
 from quasilpv.reproduction.tracking_comparison import Comparison, Sampled
-from quasilpv.synthesis import Specification, synthesise
+from quasilpv.synthesis import DesignRequest, Specification, synthesise
 from quasilpv.systems.robots.registry import robot
 from reference.readable import assert_readable
 from reference.runs import synthetic_result
@@ -150,7 +150,7 @@ def test_an_observer_without_disturbance_keeps_the_gains_of_angles_and_speeds_an
     controller: str,
 ) -> None:
     specification = Specification(rate_hz=2000.0, disturbance_frequency_rad_s=50.0)
-    whole = to_artifact(synthesise(robot("fivebar"), controller, specification))
+    whole = to_artifact(synthesise(DesignRequest.of("fivebar", controller, specification)))
     reduced = without_disturbance_states(whole)
     assert reduced.witness is None
     assert reduced.verification is None

@@ -21,6 +21,7 @@ from quasilpv.certificate.sampled_envelope import ErrorDynamics
 from quasilpv.conditions.tracking.sampled_errors import SampledErrors, sampled_errors
 from quasilpv.errors import InputError
 from quasilpv.release import release
+from quasilpv.synthesis import DesignRequest
 from quasilpv.synthesis.acceleration.envelope import acceleration_envelope
 from quasilpv.systems.robots.registry import robot
 
@@ -32,7 +33,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 @cache
 def kept() -> Document:
-    return release("arm3").artifact.content()
+    return release(DesignRequest.of("arm3")).artifact.content()
 
 
 def envelope() -> Document:
@@ -293,7 +294,7 @@ def test_when_the_envelope_is_malformed_expect_an_input_error(name: str, value: 
 
 
 def test_when_the_disturbance_is_not_compensated_expect_no_envelope_and_none_accepted() -> None:
-    content = release("arm3", disturbance_compensation=False, allow_unverified=True).artifact.content()
+    content = release(DesignRequest.of("arm3", compensated=False), allow_unverified=True).artifact.content()
     assert "envelope" not in content["witness"]
     assert not any("envelope" in claim.name for claim in verify(content).claims)
     content["witness"]["envelope"] = envelope()

@@ -16,7 +16,8 @@ from quasilpv.documents.canonical import canonical_json, parse_strict_json
 from quasilpv.documents.mechanism import LinkParameters
 from quasilpv.documents.plants import FiveBarPlant, SerialArmPlant, SpringDiscPlant
 from quasilpv.errors import InputError
-from quasilpv.experiments.track import TrackingExperiment, track
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.release import release
 from quasilpv.scenarios import (
     OPTIONAL,
@@ -24,21 +25,22 @@ from quasilpv.scenarios import (
     Rk4Integrator,
     Scenario,
     Sensors,
+    TrackingExperiment,
     build_scenario,
     read_scenario,
-    tracking_task,
-    tracking_tasks,
+    tracking_experiment,
+    tracking_experiments,
     write_scenario,
 )
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 from quasilpv.trajectories import Trajectory, rest
 from quasilpv.trajectories.document import write_trajectory
 
 ARM3 = robot("arm3")
-TRAJECTORIES = {task.id: task.trajectory(ARM3.model, ARM3.domain) for task in tracking_tasks() if task.robot == "arm3"}
+TRAJECTORIES = {one.name: one.trajectory for one in tracking_experiments() if one.robot.id == "arm3"}
 SQUARE = TRAJECTORIES["serial-square"]
-DISTURBED = build_scenario(ARM3, SQUARE, external_torque=tracking_task("serial-square").external_torque)
+DISTURBED = build_scenario(ARM3, SQUARE, external_torque=tracking_experiment("serial-square").external_torque)
 FORMATS = Path(__file__).parents[2] / "docs" / "reference" / "formats.md"
 
 
@@ -49,7 +51,7 @@ def arm_of(scenario: Scenario) -> SerialArmPlant:
 
 def test_when_the_registry_is_listed_expect_two_paths_of_the_serial_arm_and_one_of_the_five_bar_robot() -> None:
     assert list(TRAJECTORIES) == ["serial-square", "serial-circle"]
-    spirals = {task.id: task for task in tracking_tasks() if task.robot == "fivebar"}
+    spirals = {one.name: one for one in tracking_experiments() if one.robot.id == "fivebar"}
     assert list(spirals) == ["fivebar-spiral", "fivebar-spiral-fast", "fivebar-spiral-strong"]
     for name, frequency, amplitude in (("fivebar-spiral", 5.0, 15.0), ("fivebar-spiral-strong", 50.0, 100.0)):
         first, second = spirals[name].external_torque
@@ -60,9 +62,9 @@ def test_when_the_registry_is_listed_expect_two_paths_of_the_serial_arm_and_one_
 
 
 def test_when_a_scenario_is_unknown_expect_the_known_ones_in_the_error() -> None:
-    assert tracking_task("serial-circle").id == "serial-circle"
+    assert tracking_experiment("serial-circle").name == "serial-circle"
     with pytest.raises(InputError, match="got spiral, expected one of serial-square, serial-circle, fivebar-spiral"):
-        tracking_task("spiral")
+        tracking_experiment("spiral")
 
 
 @pytest.mark.parametrize("name", TRAJECTORIES)
@@ -99,7 +101,7 @@ def test_when_the_plant_is_perturbed_expect_chapter_iv_with_inertias_about_the_c
 
 
 def test_the_scenarios_of_the_arm_have_the_disturbance_of_the_thesis_and_the_default_sensors_are_its_too() -> None:
-    scenario = build_scenario(ARM3, SQUARE, external_torque=tracking_task("serial-square").external_torque)
+    scenario = build_scenario(ARM3, SQUARE, external_torque=tracking_experiment("serial-square").external_torque)
     terms = [(t.joint, t.amplitude_nm, t.frequency_rad_s, t.phase_rad) for t in scenario.external_torque]
     assert terms == [(0, 450.0, 15.0, 0.0), (1, 375.0, 15.0, 0.0), (2, 300.0, 15.0, 0.0)]
     assert (scenario.sensors.encoder_bits, scenario.sensors.velocity_noise_rad_s) == (20, 0.05)
@@ -212,7 +214,7 @@ def test_when_a_scenario_is_written_expect_exactly_the_members_the_format_docume
 
 def run_with(scenario: Scenario) -> dict[str, np.ndarray]:
     """The first 0.1 s in closed loop with the printed PID gains."""
-    artifact, short = release("arm3", "pid").artifact, {**scenario.to_document(), "duration_s": 0.1}
+    artifact, short = release(DesignRequest.of("arm3", "pid")).artifact, {**scenario.to_document(), "duration_s": 0.1}
     return _runtime.run_closed_loop(
         _runtime.Artifact.parse(canonical_json(artifact.to_document())),
         _runtime.Trajectory.parse(canonical_json(SQUARE.to_document())),
@@ -399,11 +401,11 @@ def test_when_something_stands_around_the_document_expect_both_languages_to_refu
 
 @pytest.mark.parametrize("share", [1e-3, 0.4, 0.6, 0.999])
 def test_when_the_run_is_shorter_than_a_sample_expect_both_languages_to_refuse_it(share: float, tmp_path: Path) -> None:
-    artifact = release("arm3", "pid", Specification()).artifact
+    artifact = release(DesignRequest.of("arm3", "pid", Specification())).artifact
     reference = rest("short", 3, share * artifact.sample_period_s)
     experiment = TrackingExperiment("short", ARM3, reference)
     with pytest.raises(InputError, match=r"short: duration_s: got .*, expected at least one sample"):
-        track(experiment, artifact, tmp_path, plant="nominal", sensors=Sensors())
+        track(RunSetup(experiment, artifact, plant="nominal", sensors=Sensors()), tmp_path)
     path, _ = write_artifact(tmp_path, artifact)
     trajectory = write_trajectory(tmp_path / "trajectory.json", reference)
     scenario = write_scenario(tmp_path / "scenario.json", build_scenario(ARM3, reference))

@@ -24,7 +24,7 @@ from quasilpv.lmi import Problem, SdpaProgram, Solution, Variable, block, he
 from quasilpv.lmi.assembly import unpack
 from quasilpv.lmi.backends import BackendName
 from quasilpv.release import release
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.synthesis.shipped_problem import shipped_problem
 from reference.shipped_laws import (
     DECAY,
@@ -180,7 +180,7 @@ def test_when_more_is_asked_than_the_optimum_gives_expect_every_solver_to_refuse
 def test_when_an_artifact_is_exported_expect_the_problem_its_gains_came_from(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    made = release("arm2")
+    made = release(DesignRequest.of("arm2"))
     artifact, out = tmp_path / "artifact.json", tmp_path / "problem.dat-s"
     artifact.write_bytes(canonical_json(made.artifact.to_document()))
     assert run(["export-sdp", str(artifact), "-o", str(out), "--json"]) == 0
@@ -198,7 +198,7 @@ def test_when_an_artifact_is_exported_expect_the_problem_its_gains_came_from(
 @pytest.mark.parametrize("damage", ["law", "witness"])
 def test_when_an_artifact_has_no_problem_behind_it_expect_a_clear_refusal(damage: str) -> None:
     if damage == "law":
-        document = release("arm2", "pid", Specification()).artifact.content()
+        document = release(DesignRequest.of("arm2", "pid", Specification())).artifact.content()
         with pytest.raises(InputError, match=r"law\.kind.*pid.*dob-acceleration"):
             shipped_problem(document)
     else:

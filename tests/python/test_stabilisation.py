@@ -19,11 +19,10 @@ from quasilpv.certificate import gate, verify
 from quasilpv.certificate.robot_dynamics import gravity_stiffness, robot_dynamics
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InfeasibleError, InputError
-from quasilpv.experiments.track import TrackingExperiment
 from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.state_law import StateLaw
 from quasilpv.release import to_artifact
-from quasilpv.scenarios import Sensors, build_scenario
+from quasilpv.scenarios import Sensors, build_scenario, tracking_experiment
 from quasilpv.synthesis.progress import no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.stabilising.laws import DECAY_PER_S, stabilisation
@@ -129,7 +128,7 @@ def test_when_a_number_of_the_claim_is_wrong_expect_it_found_out(
 def closed_loop(
     robot_id: str, controller: str, plant: Literal["nominal", "perturbed"] = "nominal"
 ) -> dict[str, FloatArray]:
-    artifact, experiment = designed(robot_id, controller), TrackingExperiment.registered(SCENARIOS[robot_id])
+    artifact, experiment = designed(robot_id, controller), tracking_experiment(SCENARIOS[robot_id])
     scenario = build_scenario(
         experiment.robot,
         experiment.trajectory,
@@ -292,7 +291,7 @@ def test_when_theta_zero_is_outside_the_domain_or_the_inertia_has_many_premises_
 
 @pytest.mark.parametrize("name", [name for name in SCENARIOS.values() if name != "stabilise-spring-disc"])
 def test_when_a_stabilisation_is_built_expect_it_to_start_off_its_reference_at_rest(name: str) -> None:
-    experiment = TrackingExperiment.registered(name)
+    experiment = tracking_experiment(name)
     assert isinstance(experiment.trajectory, Trajectory)
     assert not experiment.trajectory.coefficients.any()
     scenario = build_scenario(

@@ -14,8 +14,8 @@ import pytest
 from quasilpv.errors import ClaimError, InfeasibleError, PlantError
 from quasilpv.experiments import designs
 from quasilpv.experiments.start import Start, StartOutcome, joining_speed, start
-from quasilpv.scenarios import build_scenario, tracking_task
-from quasilpv.synthesis import CONTROLLERS, Specification
+from quasilpv.scenarios import build_scenario, tracking_experiment
+from quasilpv.synthesis import CONTROLLERS, DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 
 TRACKING = tuple(name for name in CONTROLLERS if name not in ("pdc", "descriptor", "robust", "delayed"))
@@ -81,16 +81,16 @@ class Row:
 
 def row(scenario: str, controller: str, plant: str, kind: Start, *, cache: Path, seconds: float | None = None) -> Row:
     """Design, start, and compare; with ``seconds`` the run is cut to that time."""
-    task = tracking_task(scenario)
-    source = robot(task.robot)
+    task = tracking_experiment(scenario)
+    source = task.robot
     wanted = Specification(
         rate_hz=CONTROLLERS[controller].rate_hz, disturbance_frequency_rad_s=source.disturbance_frequency_rad_s
     )
     try:
-        artifact = designs.kept_design(source.id, controller, wanted, folder=cache)
+        artifact = designs.kept_design(DesignRequest.of(source.id, controller, wanted), folder=cache)
     except (InfeasibleError, ClaimError) as error:
         return Row(scenario, controller, plant, kind, None, str(error))
-    trajectory = task.trajectory(source.model, source.domain)
+    trajectory = task.trajectory
     in_motion = kind in (Start.RESTART, Start.RESET)  # a law that stabilises is at rest on its reference
     experiment = build_scenario(
         source,
@@ -125,7 +125,7 @@ def test_F11_the_whole_table_of_starts_is_within_its_bounds(tmp_path: Path, cach
     lines = [LINE.format(*heading)]
     beyond = []
     for scenario, controller in TABLE:
-        shaken = (SHAKEN,) if tracking_task(scenario).external_torque else ()
+        shaken = (SHAKEN,) if tracking_experiment(scenario).external_torque else ()
         for plant in ("nominal", "perturbed", *shaken):
             for kind in Start:
                 found = row(scenario, controller, plant, kind, cache=cache)
@@ -156,7 +156,7 @@ def test_a_start_at_rest_is_within_a_bound_of_zero_and_nothing_else_is(
 
 def test_the_speed_of_joining_is_that_of_the_quintic_whatever_the_start(cache: Path) -> None:
     source = robot("arm3")
-    artifact = designs.kept_design("arm3", "pid", Specification(), folder=cache)
+    artifact = designs.kept_design(DesignRequest.of("arm3", "pid", Specification()), folder=cache)
     fastest = np.abs(artifact.domain.speed_rad_s).max(axis=1)
     beside = joining_speed(artifact, np.array([0.1, 0.0, 0.0]), np.zeros(3))
     assert beside[1] == beside[2] == 0.0

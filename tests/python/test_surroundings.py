@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from quasilpv.experiments.track import TrackingExperiment, track
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.release import release
-from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification
+from quasilpv.scenarios import Sensors, TrackingExperiment
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 from quasilpv.telemetry import LOG_NAME
 from quasilpv.trajectories import rest
@@ -47,8 +48,8 @@ TEX = "text.usetex: True\nfont.family: nonsense\nbackend: nonsense\nsavefig.dpi:
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     experiment = TrackingExperiment("hold", robot("arm3"), rest("hold", 3, 0.05))
-    artifact = release("arm3", "pid", Specification()).artifact
-    track(experiment, artifact, folder, plant="nominal", sensors=Sensors())
+    artifact = release(DesignRequest.of("arm3", "pid", Specification())).artifact
+    track(RunSetup(experiment, artifact, plant="nominal", sensors=Sensors()), folder)
     return folder / LOG_NAME
 
 

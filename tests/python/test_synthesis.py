@@ -8,7 +8,7 @@ import pytest
 from quasilpv.artifact import evaluate
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.release import Release, release
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.synthesis.acceleration.inertia_range import needed_inertia_range
 from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw, SampledLoop
 from quasilpv.systems.robots.registry import robot
@@ -16,7 +16,7 @@ from quasilpv.systems.robots.registry import robot
 
 @cache
 def default_release() -> Release:
-    return release("arm3")
+    return release(DesignRequest.of("arm3"))
 
 
 def law_of(made: Release) -> AccelerationLaw:
@@ -55,11 +55,11 @@ def test_when_the_default_design_ships_expect_the_margin_to_exceed_the_needed_ra
 
 
 def test_when_a_design_is_repeated_expect_the_same_artifact() -> None:
-    assert release("arm3").artifact.hash == default_release().artifact.hash
+    assert release(DesignRequest.of("arm3")).artifact.hash == default_release().artifact.hash
 
 
 def test_when_the_specification_changes_expect_another_design_hash() -> None:
-    other = release("arm3", specification=Specification(encoder_bits=17))
+    other = release(DesignRequest.of("arm3", specification=Specification(encoder_bits=17)))
     assert other.artifact.design_hash != default_release().artifact.design_hash
     assert other.report["disturbance_gain_s2"] > default_release().report["disturbance_gain_s2"]
 
@@ -75,24 +75,24 @@ def test_when_the_specification_cannot_be_met_expect_one_line_that_says_why(
     specification: Specification, reason: str
 ) -> None:
     with pytest.raises(InfeasibleError, match=rf"arm3: no acceleration-level design at 1000 Hz: .*{reason}") as caught:
-        release("arm3", specification=specification)
+        release(DesignRequest.of("arm3", specification=specification))
     assert "\n" not in str(caught.value)
 
 
 def test_when_names_or_numbers_are_wrong_expect_an_input_error() -> None:
     with pytest.raises(InputError, match="arm9"):
-        release("arm9")
+        release(DesignRequest.of("arm9"))
     with pytest.raises(InputError, match=r"controller.*fuzzy.*pid"):
-        release("arm3", "fuzzy")
+        release(DesignRequest.of("arm3", "fuzzy"))
     with pytest.raises(InputError, match="disturbance_compensation"):
-        release("arm3", "pid", disturbance_compensation=False)
+        release(DesignRequest.of("arm3", "pid", compensated=False))
     for field, value in (("rate_hz", 0.0), ("rate_hz", float("nan")), ("encoder_bits", 3), ("margin_spare", 0.9)):
         with pytest.raises(InputError, match=field):
             Specification(**{field: value})
 
 
 def test_when_pid_is_written_expect_the_printed_gains() -> None:
-    law = release("arm3", "pid").artifact.law
+    law = release(DesignRequest.of("arm3", "pid")).artifact.law
     assert law.kind == "pid"
     # Dehak 2022 (III.55), five printed digits
     assert np.allclose(law.kp, 1e4 * np.array([24.280, 6.413, 0.866]), rtol=6e-4)
@@ -101,7 +101,7 @@ def test_when_pid_is_written_expect_the_printed_gains() -> None:
 
 
 def test_when_computed_torque_is_written_expect_the_printed_gains() -> None:
-    law = release("arm3", "ctc").artifact.law
+    law = release(DesignRequest.of("arm3", "ctc")).artifact.law
     assert law.kind == "ctc"
     # Dehak 2022 (III.57)
     assert np.allclose(law.gp, 6.6620e3, rtol=1e-5)
@@ -114,7 +114,7 @@ def test_when_computed_torque_is_written_expect_the_printed_gains() -> None:
 @pytest.mark.parametrize("robot_id", ["arm2", "arm3"])
 def test_when_programs_are_compiled_expect_the_model_they_came_from(robot_id: str, controller: str) -> None:
     model = robot(robot_id).model
-    artifact = release(robot_id, controller).artifact
+    artifact = release(DesignRequest.of(robot_id, controller)).artifact
     rng = np.random.default_rng(1)
     for _ in range(20):
         theta, omega, rho = rng.normal(size=(3, model.joints))

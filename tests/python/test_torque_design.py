@@ -14,12 +14,13 @@ from quasilpv import _runtime
 from quasilpv.artifact import Artifact
 from quasilpv.documents.canonical import canonical_cbor, canonical_json
 from quasilpv.errors import InfeasibleError
-from quasilpv.experiments.track import TrackingExperiment, track
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.torque_law import TorqueLaw
 from quasilpv.release import Release, release, to_artifact
-from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification
+from quasilpv.scenarios import Sensors, tracking_experiment
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.synthesis.torque.design import TorqueDesign, design_torque_law, holds_exactly
 from quasilpv.synthesis.torque.law import tracking_design
@@ -39,7 +40,7 @@ def designed() -> TorqueDesign:
 
 @lru_cache(maxsize=1)
 def released() -> Release:
-    return release("arm2", "dob-torque", Specification(rate_hz=RATE_HZ))
+    return release(DesignRequest.of("arm2", "dob-torque", Specification(rate_hz=RATE_HZ)))
 
 
 # ---- the frozen loop -------------------------------------------------------------------------------------------------
@@ -198,8 +199,8 @@ def test_when_the_grid_is_evaluated_again_expect_the_reported_rates_and_other_ga
 def test_when_the_arm_tracks_the_default_scenarios_expect_the_required_accuracy(tmp_path: Path) -> None:
     artifact = to_artifact(tracking_design(robot("arm3"), Specification(rate_hz=RATE_HZ), designed()))
     for scenario in ("serial-square", "serial-circle"):
-        experiment = TrackingExperiment.registered(scenario)
-        result = track(experiment, artifact, tmp_path / scenario, plant="perturbed", sensors=Sensors())
+        experiment = tracking_experiment(scenario)
+        result = track(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()), tmp_path / scenario)
         metrics = result.metrics
         assert max(metrics.rms_x_m, metrics.rms_y_m) <= 4e-4
         assert max(metrics.mav_x_m, metrics.mav_y_m) <= 7e-4

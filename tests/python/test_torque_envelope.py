@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from quasilpv.certificate import verify
 from quasilpv.errors import InputError
 from quasilpv.release import release
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import DesignRequest, Specification
 
 FloatArray = npt.NDArray[np.float64]
 Document = dict[str, Any]
@@ -26,7 +26,7 @@ STEPS = 40
 
 @cache
 def kept() -> Document:
-    return release("arm2", "dob-torque", Specification(rate_hz=4000.0)).artifact.content()
+    return release(DesignRequest.of("arm2", "dob-torque", Specification(rate_hz=4000.0))).artifact.content()
 
 
 def envelope() -> Document:

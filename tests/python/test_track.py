@@ -22,12 +22,21 @@ from quasilpv.experiments.hil import merge_records, read_record, require_identic
 from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.run import FloatArray
-from quasilpv.experiments.track import TrackingExperiment, run_from_columns, track
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import run_from_columns, track
 from quasilpv.release import release
-from quasilpv.scenarios import IdaIntegrator, Rk4Integrator, Scenario, Sensors, build_scenario
-from quasilpv.synthesis import Specification, synthesise
+from quasilpv.scenarios import (
+    IdaIntegrator,
+    Rk4Integrator,
+    Scenario,
+    Sensors,
+    TrackingExperiment,
+    build_scenario,
+    tracking_experiment,
+)
+from quasilpv.synthesis import DesignRequest, Specification, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.robots.registry import Robot, robot
+from quasilpv.systems.robots.registry import robot
 from reference.runs import synthetic_run
 
 EXACT = Sensors(encoder_bits=0, velocity_noise_rad_s=0.0)
@@ -40,7 +49,9 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def design(cache: Path, controller: str, *, compensate: bool = True) -> Artifact:
-    return designs.kept_design("arm3", controller, Specification(), disturbance_compensation=compensate, folder=cache)
+    return designs.kept_design(
+        DesignRequest.of("arm3", controller, Specification(), compensated=compensate), folder=cache
+    )
 
 
 @pytest.fixture(scope="session")
@@ -49,11 +60,8 @@ def results(cache: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[tuple
     folder = tmp_path_factory.mktemp("runs")
     return {
         (scenario, controller): track(
-            TrackingExperiment.registered(scenario),
-            design(cache, controller),
+            RunSetup(tracking_experiment(scenario), design(cache, controller), plant="perturbed", sensors=Sensors()),
             folder / scenario / controller,
-            plant="perturbed",
-            sensors=Sensors(),
         )
         for scenario in ("serial-square", "serial-circle")
         for controller in (*BASELINES, "dob-acceleration")
@@ -118,9 +126,9 @@ def test_when_a_law_runs_with_and_without_compensation_expect_its_gains_searched
 ) -> None:
     searched: list[str] = []
 
-    def counted(source: Robot, controller: str, *arguments: Any, **options: Any) -> TrackingDesign:
-        searched.append(controller)
-        return synthesise(source, controller, *arguments, **options)
+    def counted(request: DesignRequest, **options: Any) -> TrackingDesign:
+        searched.append(request.controller)
+        return synthesise(request, **options)
 
     monkeypatch.setattr(designs, "synthesise", counted)
     monkeypatch.setattr(designs, "_designs", {})
@@ -132,7 +140,7 @@ def test_when_a_law_runs_with_and_without_compensation_expect_its_gains_searched
         assert artifact.verification["gate"]["passed"]
     assert len(list(tmp_path.iterdir())) == 2
     design(tmp_path, "dob-acceleration")
-    designs.kept_design("arm3", "dob-acceleration", Specification(encoder_bits=17), folder=tmp_path)
+    designs.kept_design(DesignRequest.of("arm3", "dob-acceleration", Specification(encoder_bits=17)), folder=tmp_path)
     assert searched == ["dob-acceleration"] * 2
 
 
@@ -148,8 +156,8 @@ def test_when_rate_encoders_or_code_change_expect_another_design(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     design(tmp_path, "ctc")
-    designs.kept_design("arm3", "ctc", Specification(rate_hz=2000.0), folder=tmp_path)
-    designs.kept_design("arm3", "ctc", Specification(encoder_bits=17), folder=tmp_path)
+    designs.kept_design(DesignRequest.of("arm3", "ctc", Specification(rate_hz=2000.0)), folder=tmp_path)
+    designs.kept_design(DesignRequest.of("arm3", "ctc", Specification(encoder_bits=17)), folder=tmp_path)
     monkeypatch.setattr(designs, "_code_digest", lambda: "another")
     design(tmp_path, "ctc")
     assert len(list(tmp_path.iterdir())) == 4
@@ -159,7 +167,9 @@ def test_when_encoders_are_too_coarse_for_the_torque_activity_expect_infeasible_
     tmp_path: Path,
 ) -> None:
     with pytest.raises(InfeasibleError):
-        designs.kept_design("arm3", "dob-acceleration", Specification(encoder_bits=8), folder=tmp_path)
+        designs.kept_design(
+            DesignRequest.of("arm3", "dob-acceleration", Specification(encoder_bits=8)), folder=tmp_path
+        )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -193,11 +203,13 @@ def test_when_the_disturbance_is_not_compensated_expect_at_least_twenty_times_th
     results: dict[tuple[str, str], TrackResult], cache: Path, tmp_path: Path
 ) -> None:
     uncompensated = track(
-        TrackingExperiment.registered("serial-square"),
-        design(cache, "dob-acceleration", compensate=False),
+        RunSetup(
+            tracking_experiment("serial-square"),
+            design(cache, "dob-acceleration", compensate=False),
+            plant="perturbed",
+            sensors=Sensors(),
+        ),
         tmp_path,
-        plant="perturbed",
-        sensors=Sensors(),
     )
     compensated = results["serial-square", "dob-acceleration"].metrics
     assert uncompensated.metrics.rms_x_m >= 20.0 * compensated.rms_x_m
@@ -207,7 +219,7 @@ def test_when_the_disturbance_is_not_compensated_expect_at_least_twenty_times_th
 
 @pytest.mark.parametrize("controller", [*BASELINES, "dob-acceleration"])
 def test_when_quantisation_and_noise_are_off_expect_ida_and_rk4_to_agree(controller: str, cache: Path) -> None:
-    experiment = TrackingExperiment.registered("serial-circle")
+    experiment = tracking_experiment("serial-circle")
     artifact = _runtime.Artifact.parse(canonical_json(design(cache, controller).to_document()))
     reference = _runtime.Trajectory.parse(canonical_json(experiment.trajectory.to_document()))
 
@@ -230,8 +242,8 @@ def runtime_scenario(scenario: Scenario) -> _runtime.Scenario:
 
 
 def test_when_the_plant_is_the_model_expect_the_true_disturbance_to_be_the_external_torque() -> None:
-    experiment = TrackingExperiment.registered("serial-square")
-    artifact = release("arm3", "ctc-dob").artifact
+    experiment = tracking_experiment("serial-square")
+    artifact = release(DesignRequest.of("arm3", "ctc-dob")).artifact
     runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()))
     torque = experiment.external_torque
     scenario = build_scenario(
@@ -263,10 +275,10 @@ def test_when_the_observer_has_converged_expect_its_estimate_near_the_true_distu
 
 
 def test_when_the_controller_is_for_another_robot_expect_one_line_and_no_files(tmp_path: Path) -> None:
-    other = release("arm2", "pid").artifact
+    other = release(DesignRequest.of("arm2", "pid")).artifact
     with pytest.raises(InputError, match=r"robot\.id: got arm2, expected arm3"):
         track(
-            TrackingExperiment.registered("serial-square"), other, tmp_path / "run", plant="nominal", sensors=Sensors()
+            RunSetup(tracking_experiment("serial-square"), other, plant="nominal", sensors=Sensors()), tmp_path / "run"
         )
     assert not (tmp_path / "run").exists()
 
@@ -278,11 +290,13 @@ def test_when_controller_and_plant_are_two_processes_in_lock_step_expect_identic
     results: dict[tuple[str, str], TrackResult], cache: Path, tmp_path: Path
 ) -> None:
     over_lcm = run_over_lcm(
-        TrackingExperiment.registered("serial-circle"),
-        design(cache, "dob-acceleration"),
+        RunSetup(
+            tracking_experiment("serial-circle"),
+            design(cache, "dob-acceleration"),
+            plant="perturbed",
+            sensors=Sensors(),
+        ),
         tmp_path,
-        plant="perturbed",
-        sensors=Sensors(),
         mode="lockstep",
     )
     in_process = results["serial-circle", "dob-acceleration"]
@@ -297,7 +311,7 @@ def write_csv(path: Path, names: str, rows: list[str]) -> Path:
 
 
 def test_when_records_miss_different_samples_expect_the_common_ones_matched_by_number(tmp_path: Path) -> None:
-    artifact = release("arm2", "pid").artifact
+    artifact = release(DesignRequest.of("arm2", "pid")).artifact
     plant_columns = ["angle_rad", "speed_rad_s", "acceleration_rad_s2", "external_torque_nm"]
     controller_columns = [
         *("measured_angle_rad", "reference_angle_rad", "reference_speed_rad_s", "torque_applied_nm"),

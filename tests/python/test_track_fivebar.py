@@ -8,9 +8,10 @@ import pytest
 
 from quasilpv.experiments.designs import kept_design
 from quasilpv.experiments.result import TrackResult
-from quasilpv.experiments.track import TrackingExperiment, track
-from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
+from quasilpv.scenarios import Sensors, tracking_experiment
+from quasilpv.synthesis import DesignRequest, Specification
 
 LARGEST_RMS_M = {2000.0: 1.0e-4, 4000.0: 2.0e-5}
 """Required accuracy of the default design on the spiral, both axes, by rate."""
@@ -18,14 +19,11 @@ LARGEST_RMS_M = {2000.0: 1.0e-4, 4000.0: 2.0e-5}
 
 def run(folder: Path, scenario: str, rate_hz: float, *, compensate: bool = True) -> TrackResult:
     artifact = kept_design(
-        "fivebar",
-        "dob-acceleration",
-        Specification(rate_hz=rate_hz),
-        disturbance_compensation=compensate,
+        DesignRequest.of("fivebar", "dob-acceleration", Specification(rate_hz=rate_hz), compensated=compensate),
         folder=folder / "designs",
     )
-    experiment = TrackingExperiment.registered(scenario)
-    return track(experiment, artifact, folder / scenario, plant="perturbed", sensors=Sensors())
+    experiment = tracking_experiment(scenario)
+    return track(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()), folder / scenario)
 
 
 @pytest.mark.parametrize("rate_hz", sorted(LARGEST_RMS_M))

@@ -14,7 +14,7 @@ from quasilpv.errors import InfeasibleError
 from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.velocity_law import VelocityLaw
 from quasilpv.release import Release, release
-from quasilpv.synthesis import CONTROLLERS, Specification, specification
+from quasilpv.synthesis import CONTROLLERS, DesignRequest, Specification, specification
 from quasilpv.synthesis.acceleration.design import design_acceleration_law
 from quasilpv.synthesis.baselines import printed as baselines
 from quasilpv.synthesis.baselines import tuned as tuned_baselines
@@ -241,7 +241,7 @@ def test_when_the_torque_may_not_move_expect_no_design_and_the_reason() -> None:
 def test_when_a_tuned_baseline_is_released_expect_the_law_kind_of_its_family_and_the_numbers_found(
     controller: str, kind: str
 ) -> None:
-    made: Release = release("arm2", controller)
+    made: Release = release(DesignRequest.of("arm2", controller))
     law, report = made.artifact.law, made.report
     assert law.kind == kind
     assert controller in made.artifact.name
@@ -251,7 +251,7 @@ def test_when_a_tuned_baseline_is_released_expect_the_law_kind_of_its_family_and
         assert list(law.gp) == pytest.approx([baselines.Tuning(**numbers).unit_gains()[0]] * 2)
         assert law.disturbance_observer_bandwidth_rad_s == report["observer_bandwidth_rad_s"]
     if kind == "pid":  # the search is the same for all
-        assert release("arm2", controller).artifact.hash == made.artifact.hash
+        assert release(DesignRequest.of("arm2", controller)).artifact.hash == made.artifact.hash
 
 
 def test_when_the_poles_are_equal_expect_the_gains_of_a_triple_pole() -> None:

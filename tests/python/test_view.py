@@ -26,10 +26,11 @@ from quasilpv.artifact import Artifact, write_artifact
 from quasilpv.cli import run
 from quasilpv.errors import InputError
 from quasilpv.experiments.logged import mechanism_of
-from quasilpv.experiments.track import TrackingExperiment, track
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.release import release
-from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification
+from quasilpv.scenarios import Sensors, TrackingExperiment
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 from quasilpv.telemetry import LOG_NAME, RunLog, read_log
 from quasilpv.telemetry.message_types import message_type
@@ -46,7 +47,7 @@ PATIENCE_S = 30.0
 
 @pytest.fixture(scope="module")
 def artifact() -> Artifact:
-    return release("arm3", "ctc-dob", Specification()).artifact
+    return release(DesignRequest.of("arm3", "ctc-dob", Specification())).artifact
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +55,7 @@ def log(artifact: Artifact, tmp_path_factory: pytest.TempPathFactory) -> RunLog:
     """The arm draws the square."""
     folder = tmp_path_factory.mktemp("view")
     experiment = TrackingExperiment("square", ARM, serial_square(ARM.model))
-    track(experiment, artifact, folder, plant="perturbed", sensors=Sensors())
+    track(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()), folder)
     return read_log(folder / LOG_NAME)
 
 

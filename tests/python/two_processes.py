@@ -27,7 +27,7 @@ import pytest
 from quasilpv.artifact import read_artifact, write_artifact
 from quasilpv.release import release
 from quasilpv.scenarios import EXTERNAL_TORQUE, build_scenario, read_scenario, write_scenario
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 from quasilpv.trajectories import serial_square
 from quasilpv.trajectories.document import write_trajectory
@@ -178,7 +178,7 @@ def documents(tmp_path_factory: pytest.TempPathFactory) -> Path:
     arm = robot("arm3")
     trajectory = serial_square(arm.model)
     scenario = build_scenario(arm, trajectory, external_torque=EXTERNAL_TORQUE, transport_delay_s=2e-4)
-    write_artifact(folder, release("arm3", "ctc-dob", Specification()).artifact)
+    write_artifact(folder, release(DesignRequest.of("arm3", "ctc-dob", Specification())).artifact)
     write_trajectory(folder / "trajectory.json", trajectory)
     write_scenario(folder / "scenario.json", scenario.model_copy(update={"duration_s": SAMPLES * 1e-3}))
     return folder

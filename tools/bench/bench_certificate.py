@@ -16,7 +16,7 @@ from flint import fmpq_mat
 from quasilpv.certificate import claims, verify
 from quasilpv.certificate.exact_matrices import is_positive_definite
 from quasilpv.experiments.designs import kept_design
-from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification
+from quasilpv.synthesis import DEFAULT_CONTROLLER, DesignRequest, Specification
 
 ROBOT = "arm3"
 
@@ -58,7 +58,9 @@ COMPETITORS: Mapping[str, Callable[[fmpq_mat], bool]] = {"fractions": with_fract
 def measure(quick: bool) -> Report:
     """Time the check as a whole, then its definiteness test against others on the very same matrices."""
     repetitions = 1 if quick else REPETITIONS
-    document = kept_design(ROBOT, DEFAULT_CONTROLLER, Specification(), folder=ROOT / "out" / "cache").content()
+    document = kept_design(
+        DesignRequest.of(ROBOT, DEFAULT_CONTROLLER, Specification()), folder=ROOT / "out" / "cache"
+    ).content()
     with decided_matrices() as matrices:
         verdict = verify(document)
     if not verdict.verified:

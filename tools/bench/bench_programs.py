@@ -29,7 +29,7 @@ from quasilpv.scenarios import (
     build_scenario,
     write_scenario,
 )
-from quasilpv.synthesis import Specification
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 from quasilpv.trajectories import serial_square
 from quasilpv.trajectories.document import write_trajectory
@@ -126,7 +126,7 @@ class Experiment:
 
     def artifact(self, controller: str) -> Path:
         """Write the artifact of a controller at its default specification; a design made before is reused."""
-        design = kept_design(ROBOT, controller, Specification(), folder=ROOT / "out" / "cache")
+        design = kept_design(DesignRequest.of(ROBOT, controller, Specification()), folder=ROOT / "out" / "cache")
         return write_artifact(self.folder / controller, design)[0]
 
     def states(self, count: int) -> Path:

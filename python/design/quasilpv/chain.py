@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeAlias
@@ -35,15 +35,23 @@ from quasilpv.errors import InputError, one_of
 from quasilpv.experiments.metrics import Metrics
 from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.run import Run
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, robot_of, track
+from quasilpv.experiments.setup import PlantKind, RunSetup
+from quasilpv.experiments.track import robot_of, track
 from quasilpv.figures.gallery import FIGURES, figures_of
 from quasilpv.figures.gate import gate_figure
 from quasilpv.figures.style import style
 from quasilpv.figures.tracking import plot_error, plot_path, plot_torque
 from quasilpv.files import read_bytes
 from quasilpv.release import checked_artifact
-from quasilpv.scenarios import Sensors, SineTorque, motions_of, tracking_tasks
-from quasilpv.synthesis import DEFAULT_CONTROLLER, specification_for, synthesise, without_compensation
+from quasilpv.scenarios import (
+    Sensors,
+    SineTorque,
+    TrackingExperiment,
+    motions_of,
+    tracking_experiment,
+    tracking_experiments,
+)
+from quasilpv.synthesis import DEFAULT_CONTROLLER, DesignRequest, specification_for, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots import registry
 from quasilpv.systems.robots.registry import Robot
@@ -262,8 +270,7 @@ def design(
         margin_spare=margin_spare,
         torque_activity=torque_activity,
     )
-    made = synthesise(source, law, wanted)
-    return Design(made if disturbance_compensation else without_compensation(made))
+    return Design(synthesise(DesignRequest(source, law, wanted, disturbance_compensation)))
 
 
 def verify(artifact: ArtifactLike) -> Verification:
@@ -338,13 +345,15 @@ def simulate(
 
     def run(place: Path) -> Simulation:
         made = track(
-            experiment,
-            controller,
+            RunSetup(
+                experiment,
+                controller,
+                plant=plant,
+                sensors=sensors or Sensors(),
+                transport_delay_s=transport_delay_s,
+                log=folder is not None,
+            ),
             place,
-            plant=plant,
-            sensors=sensors or Sensors(),
-            transport_delay_s=transport_delay_s,
-            log=folder is not None,
         )
         return Simulation(made)
 
@@ -367,22 +376,15 @@ def _experiment(
     """The experiment in which the robot of an artifact does what is asked for."""
     if isinstance(reference, TrackingExperiment):
         experiment = reference
-    elif isinstance(reference, str) and reference in {task.id for task in tracking_tasks()}:
-        experiment = TrackingExperiment.registered(reference)
+    elif isinstance(reference, str) and reference in {one.name for one in tracking_experiments()}:
+        experiment = tracking_experiment(reference)
     else:
         own = source or robot_of(artifact)
         trajectory = _trajectory(reference, own)
         return TrackingExperiment(trajectory.name, own, trajectory, torque or ())
     if torque is None:
         return experiment
-    return TrackingExperiment(
-        experiment.name,
-        experiment.robot,
-        experiment.trajectory,
-        torque,
-        experiment.initial_angle_rad,
-        experiment.initial_speed_rad_s,
-    )
+    return replace(experiment, external_torque=torque)
 
 
 def _trajectory(reference: str | Path | TaskPath | Trajectory, robot: Robot) -> Trajectory:
@@ -393,7 +395,7 @@ def _trajectory(reference: str | Path | TaskPath | Trajectory, robot: Robot) -> 
         return plan(robot.model, reference, robot.domain)
     source, path = str(reference), Path(reference)
     if isinstance(reference, str) and not path.suffix:
-        known = [task.id for task in tracking_tasks()]
+        known = [one.name for one in tracking_experiments()]
         raise InputError("simulate", "reference", reference, f"a file, or {one_of(known, reference)}")
     data = read_bytes(path)
     if path.suffix == ".cbor" or parse_strict_json(data, source).get("schema") == "quasilpv.trajectory":

@@ -20,12 +20,12 @@ from quasilpv.certificate import CHECKERS, Evidence, gate, verify
 from quasilpv.documents.canonical import document_hash
 from quasilpv.documents.robot import ARTIFACT_VERSION
 from quasilpv.errors import ClaimError
-from quasilpv.synthesis import DEFAULT_CONTROLLER, Specification, synthesise, without_compensation
+from quasilpv.synthesis import DesignRequest, synthesise
 from quasilpv.synthesis.actuator_demand import MotionsOf, no_motions, unmet_demands
 from quasilpv.synthesis.baselines.printed import reference_speeds
 from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.robots.registry import Robot, robot
+from quasilpv.systems.robots.registry import Robot
 
 NEEDED_OF_CLAIMS = Evidence.ENCLOSED
 """Every claim of a released artifact is proved; a sampled one does not suffice."""
@@ -51,11 +51,8 @@ class Release:
 
 
 def release(
-    robot_id: str,
-    controller: str = DEFAULT_CONTROLLER,
-    specification: Specification | None = None,
+    request: DesignRequest,
     *,
-    disturbance_compensation: bool = True,
     motions_of: MotionsOf = no_motions,
     allow_unverified: bool = False,
     progress: Progress = no_progress,
@@ -63,23 +60,18 @@ def release(
     """Design a controller, check what it claims, and put it into an artifact.
 
     Args:
-        robot_id: name in the registry of robots.
-        controller: one of `quasilpv.synthesis.CONTROLLERS`.
-        specification: what is asked for.
-        disturbance_compensation: see `without_compensation`.
+        request: what is asked for.
         motions_of: what a robot is asked for; its limits must deliver them.
         allow_unverified: release a design whose claims do not hold, that fails its gate or whose limits cannot deliver
             what it needs, marked as such.
         progress: called with (points done, points in all).
 
     Raises:
-        InputError: unknown robot or controller, or a law that cannot do without compensation.
+        InputError: unknown controller, or a law that cannot do without compensation.
         InfeasibleError: no design meets the specification.
         ClaimError: a claim does not hold, the robust gate is not passed, or the limits are too tight.
     """
-    design = synthesise(robot(robot_id), controller, specification, progress=progress)
-    if not disturbance_compensation:
-        design = without_compensation(design)
+    design = synthesise(request, progress=progress)
     return Release(checked_artifact(design, allow_unverified, motions_of), design.report)
 
 

@@ -12,11 +12,11 @@ import numpy.typing as npt
 from quasilpv.certificate.gate_data import loop_data
 from quasilpv.certificate.gate_loop import AccelerationLoopData
 from quasilpv.release import to_artifact
-from quasilpv.synthesis import Specification, synthesise
+from quasilpv.synthesis import DesignRequest, Specification, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.robots.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
 from quasilpv.systems.robots.arms import PlanarSerialArm
-from quasilpv.systems.robots.registry import Robot, robot
+from quasilpv.systems.robots.registry import Robot
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -88,7 +88,7 @@ def artifact_document(robot: Robot, loop: AccelerationLoopData, inertia_scale: f
 @cache
 def moving_design() -> TrackingDesign:
     """The five-bar's design with a motion claim, at 2 kHz."""
-    return synthesise(robot("fivebar"), "dob-moving", Specification(rate_hz=2000.0))
+    return synthesise(DesignRequest.of("fivebar", "dob-moving", Specification(rate_hz=2000.0)))
 
 
 @cache

@@ -15,7 +15,7 @@ from quasilpv.synthesis import DEFAULT_CONTROLLER
 if TYPE_CHECKING:
     from quasilpv.cli.session import Session
     from quasilpv.experiments.result import TrackResult
-    from quasilpv.experiments.track import TrackingExperiment
+    from quasilpv.scenarios import TrackingExperiment
 
 DEFAULT_SCENARIOS = ("serial-square", "serial-circle", "fivebar-spiral")
 FILE_NAME = "animation.gif"
@@ -53,10 +53,11 @@ def animate_command(
     from quasilpv.cli.results import print_results
     from quasilpv.cli.session import Session, draw_results
     from quasilpv.experiments.result import Variant
-    from quasilpv.experiments.track import PlantKind, TrackingExperiment
+    from quasilpv.experiments.setup import PlantKind
+    from quasilpv.scenarios import tracking_experiment
 
     formats = formats_of(figure_formats)
-    experiments = [TrackingExperiment.registered(name) for name in dict.fromkeys(scenarios or DEFAULT_SCENARIOS)]
+    experiments = [tracking_experiment(name) for name in dict.fromkeys(scenarios or DEFAULT_SCENARIOS)]
     bits = ENCODER_BITS if encoder_bits is None else encoder_bits
     variants = [Variant(DEFAULT_CONTROLLER, bits, compensated) for compensated in (False, True)]
     session = Session(None, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note
-from quasilpv.cli.options import FormatOption, formats_of, specification
+from quasilpv.cli.options import FormatOption, formats_of, requested
 from quasilpv.files import claim_folder
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
@@ -41,17 +41,15 @@ def demo_command(
     from quasilpv.cli.session import Session, draw_results
     from quasilpv.cli.synth import write_released
     from quasilpv.cli.track import default_variants, run_all
-    from quasilpv.experiments.track import TrackingExperiment
+    from quasilpv.scenarios import tracking_experiment
 
     formats = formats_of(figure_formats)
     claim_folder(out)
     if not json:
         print_note(f"a design for {ROBOT}, then every controller on {' and '.join(SCENARIOS)}: a few minutes")
-    released = write_released(
-        ROBOT, DEFAULT_CONTROLLER, specification(ROBOT, DEFAULT_CONTROLLER, None, None), out / ROBOT
-    )
+    released = write_released(requested(ROBOT, DEFAULT_CONTROLLER, None, None), out / ROBOT)
     session = Session(None, None, "perturbed", out)
-    results = run_all(session, [TrackingExperiment.registered(name) for name in SCENARIOS], default_variants())
+    results = run_all(session, [tracking_experiment(name) for name in SCENARIOS], default_variants())
     draw_results(results, out, formats)
     if json:
         print_json({**released, "runs": [result.row() for result in results]})

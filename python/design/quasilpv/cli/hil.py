@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from quasilpv.cli.session import Session
     from quasilpv.experiments.hil import HilResult, RealTimeOptions
     from quasilpv.experiments.result import TrackResult, Variant
-    from quasilpv.experiments.track import TrackingExperiment
+    from quasilpv.experiments.setup import RunSetup
+    from quasilpv.scenarios import TrackingExperiment
 
 LATENCIES = ("wakeup_ns", "round_trip_ns")
 COUNTERS = ("missed_commands", "late_commands", "watchdog_samples", "overruns", "skipped_ticks")
@@ -80,7 +81,8 @@ def hil_command(
     from quasilpv.cli.session import Session
     from quasilpv.experiments.hil import RealTimeOptions, require_identical
     from quasilpv.experiments.result import Variant
-    from quasilpv.experiments.track import PlantKind, TrackingExperiment, variant_of
+    from quasilpv.experiments.setup import PlantKind, variant_of
+    from quasilpv.scenarios import tracking_experiment
 
     if priority is not None and not real_time:
         raise InputError("command line", "--priority", priority, "nothing without --real-time: lock-step has no clock")
@@ -91,7 +93,7 @@ def hil_command(
     session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
     over_lcm, in_process = _run_both(
         session,
-        TrackingExperiment.registered(scenario),
+        tracking_experiment(scenario),
         variant,
         RealTimeOptions(silence_s, hold_s, priority) if real_time else None,
         url=url,
@@ -127,17 +129,19 @@ def _run_both(
         steps.end()
         steps.begin("over LCM")
         over_lcm = run_over_lcm(
-            experiment,
-            session.controller(experiment, variant, steps),
+            RunSetup(
+                experiment,
+                session.controller(experiment, variant, steps),
+                plant=session.plant,
+                sensors=sensors_of(variant.encoder_bits),
+                variant=variant,
+                log=session.log,
+            ),
             session.folder(experiment, variant),
-            plant=session.plant,
-            sensors=sensors_of(variant.encoder_bits),
             mode="lockstep" if real_time is None else "realtime",
             real_time=real_time,
-            variant=variant,
             url=url,
             key=key,
-            log=session.log,
         )
         steps.end()
     return over_lcm, in_process

@@ -18,14 +18,16 @@ def listing_command(json: JsonOption = False) -> None:
     """
     from quasilpv.conditions.registry import CONDITIONS
     from quasilpv.reproduction import ITEMS
-    from quasilpv.scenarios import tracking_tasks
+    from quasilpv.scenarios import tracking_experiments
     from quasilpv.systems.catalogue import system_names
     from quasilpv.systems.robots.registry import robots
 
     known: dict[str, list[dict[str, Any]]] = {
         "robots": [{"id": robot.id, "summary": robot.summary} for robot in robots()],
         "controllers": [{"id": name, "summary": kind.summary} for name, kind in CONTROLLERS.items()],
-        "scenarios": [{"id": task.id, "summary": task.summary, "robot": task.robot} for task in tracking_tasks()],
+        "scenarios": [
+            {"id": one.name, "summary": one.summary, "robot": one.robot.id} for one in tracking_experiments()
+        ],
         "systems": [_system(name) for name in system_names()],
         "conditions": [{"id": name, "summary": entry.summary} for name, entry in CONDITIONS.items()],
         "items": [{"id": name, "summary": entry.title} for name, entry in ITEMS.items()],

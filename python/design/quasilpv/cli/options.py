@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
@@ -10,7 +11,7 @@ import typer
 
 from quasilpv.defaults import DEFAULT_FORMATS, ENCODER_BITS
 from quasilpv.errors import InputError, one_of
-from quasilpv.synthesis import CONTROLLERS, ControllerKind, Specification, specification_for
+from quasilpv.synthesis import CONTROLLERS, ControllerKind, DesignRequest, Specification, specification_for
 from quasilpv.synthesis.progress import Progress
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ def require_controller(controller: str) -> str:
     return full
 
 
-def specification(
+def requested(
     robot_id: str,
     controller: str,
     rate_hz: float | None,
@@ -126,32 +127,29 @@ def specification(
     *,
     margin_spare: float | None = None,
     torque_activity: float | None = None,
-) -> Specification:
-    """The specification of `specification_for`, for a robot by name.
+) -> DesignRequest:
+    """The design that options ask for, with the specification of `specification_for`.
 
     Raises:
         InputError: an unknown robot, or a number out of range.
     """
     from quasilpv.systems.robots.registry import robot
 
-    return specification_for(
-        robot(robot_id),
+    source = robot(robot_id)
+    wanted = specification_for(
+        source,
         controller,
         rate_hz=rate_hz,
         encoder_bits=encoder_bits,
         margin_spare=margin_spare,
         torque_activity=torque_activity,
     )
+    return DesignRequest(source, controller, wanted)
 
 
 def designed(robot_id: str, variant: Variant, rate_hz: float | None, progress: Progress) -> Artifact:
     """The controller of a variant, designed for its encoders; from the cache if it was designed before."""
     from quasilpv.experiments.designs import kept_design
 
-    return kept_design(
-        robot_id,
-        variant.controller,
-        specification(robot_id, variant.controller, rate_hz, variant.encoder_bits),
-        disturbance_compensation=variant.compensated,
-        progress=progress,
-    )
+    asked = requested(robot_id, variant.controller, rate_hz, variant.encoder_bits)
+    return kept_design(replace(asked, compensated=variant.compensated), progress=progress)

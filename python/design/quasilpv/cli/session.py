@@ -11,15 +11,11 @@ from quasilpv.cli.console import Steps, print_note, progress
 from quasilpv.cli.options import designed, sensors_of
 from quasilpv.defaults import DEFAULT_FORMATS
 from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import (
-    PlantKind,
-    TrackingExperiment,
-    disturbance_beyond_limits,
-    start_outside_domain,
-    track,
-)
+from quasilpv.experiments.setup import PlantKind, RunSetup
+from quasilpv.experiments.track import disturbance_beyond_limits, start_outside_domain, track
 from quasilpv.figures.gallery import write_comparison, write_gallery
 from quasilpv.files import claim_folder
+from quasilpv.scenarios import TrackingExperiment
 from quasilpv.telemetry import LOG_NAME
 from quasilpv.telemetry.log import point_to
 
@@ -61,13 +57,15 @@ class Session:
             if found := doubt(experiment, controller):
                 print_note(f"warning: {experiment.name}, {variant.label}: {found}")
         result = track(
-            experiment,
-            controller,
+            RunSetup(
+                experiment,
+                controller,
+                plant=self.plant,
+                sensors=sensors_of(variant.encoder_bits),
+                variant=variant,
+                log=self.log,
+            ),
             self.folder(experiment, variant),
-            plant=self.plant,
-            sensors=sensors_of(variant.encoder_bits),
-            variant=variant,
-            log=self.log,
         )
         if self.log:
             point_to(self.folder(experiment, variant) / LOG_NAME)

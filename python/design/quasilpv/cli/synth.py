@@ -14,11 +14,11 @@ from quasilpv.cli.options import (
     EncoderOption,
     RateOption,
     SpareOption,
+    requested,
     require_controller,
-    specification,
 )
 from quasilpv.files import claim_folder
-from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, Specification
+from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, DesignRequest
 
 
 def synth_command(
@@ -52,25 +52,24 @@ def synth_command(
     Example:
       design synth arm3 --rate-hz 2000 -o out/arm3-2khz
     """
-    from quasilpv.systems.robots.registry import robot
-
-    robot(robot_id)
-    design = require_controller(controller)
-    wanted = specification(
-        robot_id, design, rate_hz, encoder_bits, margin_spare=margin_spare, torque_activity=torque_activity
+    wanted = requested(
+        robot_id,
+        require_controller(controller),
+        rate_hz,
+        encoder_bits,
+        margin_spare=margin_spare,
+        torque_activity=torque_activity,
     )
     folder = out or Path("out") / robot_id
     claim_folder(folder)
-    answer = write_released(robot_id, design, wanted, folder, allow_unverified=allow_unverified)
+    answer = write_released(wanted, folder, allow_unverified=allow_unverified)
     if json:
         print_json(answer)
     else:
         print_released(answer)
 
 
-def write_released(
-    robot_id: str, design: str, wanted: Specification, out: Path, *, allow_unverified: bool = False
-) -> dict[str, Any]:
+def write_released(request: DesignRequest, out: Path, *, allow_unverified: bool = False) -> dict[str, Any]:
     """Design a controller, have it checked, and write both twins of its artifact into a folder; what --json prints.
 
     Raises:
@@ -82,10 +81,8 @@ def write_released(
     from quasilpv.scenarios import motions_of
 
     with progress(1) as steps:
-        steps.begin(f"{design} for {robot_id}")
-        made = release(
-            robot_id, design, wanted, motions_of=motions_of, allow_unverified=allow_unverified, progress=steps.parts
-        )
+        steps.begin(f"{request.controller} for {request.robot.id}")
+        made = release(request, motions_of=motions_of, allow_unverified=allow_unverified, progress=steps.parts)
         steps.end()
     paths = write_artifact(out, made.artifact)
     return {

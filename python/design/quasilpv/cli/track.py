@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from quasilpv.artifact import Artifact
     from quasilpv.cli.session import Session
     from quasilpv.experiments.result import TrackResult, Variant
-    from quasilpv.experiments.track import TrackingExperiment
+    from quasilpv.scenarios import TrackingExperiment
     from quasilpv.systems.robots.registry import Robot
 
 DEFAULT_CONTROLLERS = (
@@ -95,11 +95,12 @@ def track_command(
     """
     from quasilpv.cli.results import print_results, print_warnings
     from quasilpv.cli.session import Session, draw_results
-    from quasilpv.experiments.track import PlantKind, TrackingExperiment
+    from quasilpv.experiments.setup import PlantKind
+    from quasilpv.scenarios import TrackingExperiment, tracking_experiment
 
     formats = formats_of(figure_formats)
     given = None if artifact is None else _given(artifact, controllers, rate_hz, no_compensation)
-    experiments = [TrackingExperiment.registered(name) for name in dict.fromkeys(scenarios or [])]
+    experiments = [tracking_experiment(name) for name in dict.fromkeys(scenarios or [])]
     if trajectory is not None:
         experiments.append(TrackingExperiment.from_path_file(trajectory, _follower(given, robot_id)))
     elif robot_id is not None:
@@ -175,7 +176,7 @@ def _variants(
     given: Artifact | None, controllers: Sequence[str] | None, encoder_bits: int | None, no_compensation: bool
 ) -> list[Variant]:
     from quasilpv.experiments.result import Variant
-    from quasilpv.experiments.track import variant_of
+    from quasilpv.experiments.setup import variant_of
 
     bits = ENCODER_BITS if encoder_bits is None else encoder_bits
     sensors = sensors_of(bits)

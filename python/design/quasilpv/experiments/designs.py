@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -13,10 +14,9 @@ from quasilpv.documents.canonical import document_hash
 from quasilpv.errors import InputError
 from quasilpv.files import forget_input
 from quasilpv.release import checked_artifact, design_inputs
-from quasilpv.synthesis import Specification, synthesise, without_compensation
+from quasilpv.synthesis import DesignRequest, synthesise, without_compensation
 from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.robots.registry import robot
 
 DEFAULT_CACHE = Path("out/cache")
 
@@ -36,57 +36,50 @@ _DESIGN_ROOMS = (
     "release.py",
 )
 
-_designs: dict[tuple[str, str, Specification], TrackingDesign] = {}
+_designs: dict[DesignRequest, TrackingDesign] = {}
 """Of this process. The folder holds artifacts, and those with and without compensation are two, each with its own proof
 of the same gains."""
 
 
 def kept_design(
-    robot_id: str,
-    controller: str,
-    specification: Specification,
+    request: DesignRequest,
     *,
-    disturbance_compensation: bool = True,
     folder: Path = DEFAULT_CACHE,
     progress: Progress = no_progress,
 ) -> Artifact:
     """The artifact of a design, from the cache if the same design was made before.
 
     Args:
-        robot_id: name in the registry of robots.
-        controller: one of `quasilpv.synthesis.CONTROLLERS`.
-        specification: what is asked for.
-        disturbance_compensation: see `without_compensation`; the gains are searched for once for both.
+        request: what is asked for; the gains are searched for once, with compensation and without.
         folder: the cache; each design is a folder of it, named by the hash of its inputs and of the design code.
         progress: called with (points done, points in all) while a design is made.
 
     Raises:
-        InputError: unknown robot or controller, or the cache cannot be written.
+        InputError: unknown controller, or the cache cannot be written.
         InfeasibleError: no design meets the specification.
         ClaimError: the design fails its certificate or its robust gate.
     """
     inputs = {
-        "controller": controller,
-        "specification": specification.to_document(),
-        "disturbance_compensation": disturbance_compensation,
+        "controller": request.controller,
+        "specification": request.specification.to_document(),
+        "disturbance_compensation": request.compensated,
         "code": _code_digest(),
     }
-    place = folder / document_hash(design_inputs(robot(robot_id), inputs))[:32]
+    place = folder / document_hash(design_inputs(request.robot, inputs))[:32]
     try:
         return read_artifact(place / JSON_NAME)
     except InputError:  # not there, or damaged: made again
         forget_input(place / JSON_NAME)
-        design = _designed(robot_id, controller, specification, progress)
-        made = checked_artifact(design if disturbance_compensation else without_compensation(design))
+        design = _designed(replace(request, compensated=True), progress)
+        made = checked_artifact(design if request.compensated else without_compensation(design))
         write_artifact(place, made)
         return made
 
 
-def _designed(robot_id: str, controller: str, specification: Specification, progress: Progress) -> TrackingDesign:
-    asked = robot_id, controller, specification
-    if asked not in _designs:
-        _designs[asked] = synthesise(robot(robot_id), controller, specification, progress=progress)
-    return _designs[asked]
+def _designed(request: DesignRequest, progress: Progress) -> TrackingDesign:
+    if request not in _designs:
+        _designs[request] = synthesise(request, progress=progress)
+    return _designs[request]
 
 
 @cache

@@ -20,19 +20,10 @@ from quasilpv.artifact import Artifact
 from quasilpv.defaults import WATCHDOG_S
 from quasilpv.errors import ClaimError, FaultStop, InputError, PlantError, QuasilpvError, TransportError
 from quasilpv.experiments.fault import Fault, fault_of
-from quasilpv.experiments.result import TrackResult, Variant
+from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.run import FloatArray, Run
-from quasilpv.experiments.track import (
-    PlantKind,
-    RunFiles,
-    TrackingExperiment,
-    run_documents,
-    run_from_columns,
-    summarise,
-    variant_of,
-    write_run_files,
-)
-from quasilpv.scenarios import Sensors
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import RunFiles, run_documents, run_from_columns, summarise, write_run_files
 from quasilpv.telemetry import LOG_NAME
 from quasilpv.telemetry.log import point_to
 from quasilpv.telemetry.recorder import Recorder
@@ -100,33 +91,23 @@ class HilResult:
 
 
 def run_over_lcm(
-    experiment: TrackingExperiment,
-    artifact: Artifact,
+    setup: RunSetup,
     folder: Path,
     *,
-    plant: PlantKind,
-    sensors: Sensors,
     mode: Mode,
     real_time: RealTimeOptions | None = None,
-    variant: Variant | None = None,
     url: str | None = None,
     key: Path | None = None,
-    log: bool = True,
 ) -> HilResult:
     """Run controller and plant as two processes on this machine, with a session of their own; log what they say.
 
     Args:
-        experiment: what is tracked.
-        artifact: the controller.
+        setup: what runs.
         folder: where the run's files, both records and the log are written.
-        plant: the true plant.
-        sensors: encoders and speed noise.
         mode: lock-step (deterministic) or real time.
         real_time: watchdog times and priority, read in real time only.
-        variant: what to call the controller, by default its law kind.
         url: where they talk, by default on a port of their own.
         key: of authenticated mode, a file of mode 0600; None: messages are not authenticated.
-        log: write the log of the run.
 
     Raises:
         InputError: robot and controller do not fit, an executable is missing, or the folder cannot be written.
@@ -134,7 +115,8 @@ def run_over_lcm(
         PlantError: the plant could not be integrated.
         FaultStop: a fault stopped the run before there was anything to count.
     """
-    files = write_run_files(folder, experiment, artifact, plant=plant, sensors=sensors)
+    artifact, log = setup.artifact, setup.log
+    files = write_run_files(folder, setup)
     records = {CONTROLLER: folder / "controller.csv", SIMULATOR: folder / "plant.csv"}
     url = url or f"udpm://{MULTICAST_GROUP}:{49152 + secrets.randbelow(65536 - 49152)}?ttl=0"
     commands = _commands(files, records, mode, url)
@@ -142,10 +124,10 @@ def run_over_lcm(
         commands = {name: [*command, "--key", str(key)] for name, command in commands.items()}
     if mode == "realtime":
         commands = {name: [*command, *(real_time or RealTimeOptions()).of(name)] for name, command in commands.items()}
-    limit_s = LOCK_STEP_LIMIT_S if mode == "lockstep" else experiment.trajectory.duration_s + 4 * SILENCE_S
+    limit_s = LOCK_STEP_LIMIT_S if mode == "lockstep" else setup.experiment.trajectory.duration_s + 4 * SILENCE_S
     if log:  # the log in this place is of this run or there is none: never that of a run before it that went well
         (folder / LOG_NAME).unlink(missing_ok=True)
-    documents = run_documents(mode, files, experiment, artifact, variant or variant_of(artifact, sensors))
+    documents = run_documents(mode, files, setup)
     with Recorder(url, folder / LOG_NAME, documents) if log else nullcontext() as recorder:
         reports, said = _run_both(commands, limit_s)
         if recorder is not None:
@@ -160,7 +142,7 @@ def run_over_lcm(
             raise FaultStop(str(stop))
     return HilResult(
         mode,
-        summarise(run, experiment, artifact, plant=plant, sensors=sensors, variant=variant),
+        summarise(run, setup),
         reports[CONTROLLER],
         reports[SIMULATOR],
         stop,

@@ -9,8 +9,9 @@ import numpy as np
 from quasilpv.documents.mechanism import LinkParameters
 from quasilpv.documents.plants import FiveBarPlant, Plant, SerialArmPlant, SpringDiscPlant
 from quasilpv.errors import InputError
-from quasilpv.experiments.result import TrackResult, Variant
+from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.run import Run
+from quasilpv.experiments.setup import variant_of
 from quasilpv.experiments.track import run_from_columns, summarise_as
 from quasilpv.systems.robots.arm_parameters import Link
 from quasilpv.systems.robots.arms import PlanarSerialArm
@@ -29,7 +30,7 @@ def logged_result(log: RunLog) -> TrackResult:
         InputError: the log lacks a document, or the plant's true motion.
     """
     scenario, artifact = log.scenario, log.artifact
-    compensated = getattr(artifact.law, "disturbance_compensation", True)
+    variant = replace(variant_of(artifact, scenario.sensors), controller=log.header.controller)
     return summarise_as(
         logged_run(log),
         scenario.name,
@@ -37,7 +38,7 @@ def logged_result(log: RunLog) -> TrackResult:
         artifact,
         plant=scenario.plant.label,
         sensors=scenario.sensors,
-        variant=Variant(log.header.controller, scenario.sensors.encoder_bits, compensated),
+        variant=variant,
     )
 
 

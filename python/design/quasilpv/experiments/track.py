@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -19,69 +18,22 @@ from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.experiments.setup import RunSetup
 from quasilpv.scenarios import (
     Sensors,
-    SineTorque,
+    TrackingExperiment,
     build_scenario,
     read_scenario,
-    tracking_task,
     write_scenario,
 )
 from quasilpv.systems.robots.mechanism import PlanarMechanism
-from quasilpv.systems.robots.registry import Robot, robot, robots
+from quasilpv.systems.robots.registry import Robot, robots
 from quasilpv.telemetry import LOG_NAME, Mode, RunHeader
 from quasilpv.telemetry.recording import RunDocuments, write_run
-from quasilpv.trajectories import Trajectory, plan, read_path, write_trajectory
-
-PlantKind: TypeAlias = Literal["nominal", "perturbed"]
+from quasilpv.trajectories import write_trajectory
 
 TRAJECTORY_NAME = "trajectory.json"
 SCENARIO_NAME = "scenario.json"
-
-
-@dataclass(frozen=True, eq=False)
-class TrackingExperiment:
-    """What is tracked by which robot.
-
-    Attributes:
-        name: scenario id, or the name in the path file.
-        robot: from the registry.
-        trajectory: the reference.
-        external_torque: sines on the joints; none unless stated.
-        initial_angle_rad: angles of the plant at t = 0; None to start on the reference.
-        initial_speed_rad_s: its speeds then; None for rest.
-    """
-
-    name: str
-    robot: Robot
-    trajectory: Trajectory
-    external_torque: tuple[SineTorque, ...] = ()
-    initial_angle_rad: tuple[float, ...] | None = None
-    initial_speed_rad_s: tuple[float, ...] | None = None
-
-    @classmethod
-    def registered(cls, scenario_id: str) -> TrackingExperiment:
-        """The experiment of a scenario id.
-
-        Raises:
-            InputError: there is none of this name.
-        """
-        task = tracking_task(scenario_id)
-        task_robot = robot(task.robot)
-        trajectory = task.trajectory(task_robot.model, task_robot.domain)
-        return cls(
-            task.id, task_robot, trajectory, task.external_torque, task.initial_angle_rad, task.initial_speed_rad_s
-        )
-
-    @classmethod
-    def from_path_file(cls, path: Path | str, task_robot: Robot) -> TrackingExperiment:
-        """The experiment in which a robot follows the task-space path of a file.
-
-        Raises:
-            InputError: the file is not a path, or the path is unreachable, singular, or outside the modelling box.
-        """
-        trajectory = plan(task_robot.model, read_path(path), task_robot.domain, source=str(path))
-        return cls(trajectory.name, task_robot, trajectory)
 
 
 def robot_of(artifact: Artifact) -> Robot:
@@ -121,21 +73,14 @@ class RunFiles:
     scenario: Path
 
 
-def write_run_files(
-    folder: Path,
-    experiment: TrackingExperiment,
-    artifact: Artifact,
-    *,
-    plant: PlantKind,
-    sensors: Sensors,
-    transport_delay_s: float = 0.0,
-) -> RunFiles:
-    """Write artifact, trajectory and scenario of one run into ``folder``; arguments as those of `track`.
+def write_run_files(folder: Path, setup: RunSetup) -> RunFiles:
+    """Write artifact, trajectory and scenario of one run into ``folder``.
 
     Raises:
         InputError: the controller is for another robot, the reference shorter than its sample, or the folder cannot be
             written.
     """
+    experiment, artifact = setup.experiment, setup.artifact
     if artifact.robot.id != experiment.robot.id:
         raise InputError(
             artifact.name, "robot.id", artifact.robot.id, f"{experiment.robot.id}, which {experiment.name} is for"
@@ -149,10 +94,10 @@ def write_run_files(
     scenario = build_scenario(
         experiment.robot,
         experiment.trajectory,
-        plant=plant,
-        sensors=sensors,
+        plant=setup.plant,
+        sensors=setup.sensors,
         external_torque=experiment.external_torque,
-        transport_delay_s=transport_delay_s,
+        transport_delay_s=setup.transport_delay_s,
         initial_angle_rad=experiment.initial_angle_rad,
         initial_speed_rad_s=experiment.initial_speed_rad_s,
     )
@@ -163,47 +108,27 @@ def write_run_files(
     )
 
 
-def track(
-    experiment: TrackingExperiment,
-    artifact: Artifact,
-    folder: Path,
-    *,
-    plant: PlantKind,
-    sensors: Sensors,
-    transport_delay_s: float = 0.0,
-    variant: Variant | None = None,
-    log: bool = True,
-) -> TrackResult:
+def track(setup: RunSetup, folder: Path) -> TrackResult:
     """Run one controller on one experiment in closed loop, in this process.
 
     Args:
-        experiment: what is tracked.
-        artifact: the controller.
+        setup: what runs.
         folder: where the run's files and its log are written; the run reads them from there.
-        plant: the true plant.
-        sensors: encoders and speed noise.
-        transport_delay_s: from a sample to the moment its torque acts.
-        variant: what to call the controller; by default its law kind, which several controllers share.
-        log: write the log of the run.
 
     Raises:
         InputError: robot and controller do not fit, or the folder cannot be written.
         PlantError: the plant could not be integrated.
     """
-    files = write_run_files(
-        folder, experiment, artifact, plant=plant, sensors=sensors, transport_delay_s=transport_delay_s
-    )
+    files = write_run_files(folder, setup)
     # As bytes: a name need not be text.
     columns = _runtime.run_closed_loop(
         _runtime.Artifact.load(os.fsencode(files.artifact)),
         _runtime.Trajectory.load(os.fsencode(files.trajectory)),
         _runtime.Scenario.load(os.fsencode(files.scenario)),
     )
-    variant = variant or variant_of(artifact, sensors)
-    if log:
-        write_run(folder / LOG_NAME, run_documents("in-process", files, experiment, artifact, variant), columns)
-    run = run_from_columns(columns, artifact.joints, artifact.sample_period_s)
-    return summarise(run, experiment, artifact, plant=plant, sensors=sensors, variant=variant)
+    if setup.log:
+        write_run(folder / LOG_NAME, run_documents("in-process", files, setup), columns)
+    return summarise(run_from_columns(columns, setup.artifact.joints, setup.artifact.sample_period_s), setup)
 
 
 def disturbance_beyond_limits(experiment: TrackingExperiment, artifact: Artifact) -> str | None:
@@ -228,18 +153,16 @@ def start_outside_domain(experiment: TrackingExperiment, artifact: Artifact) -> 
     return None
 
 
-def run_documents(
-    mode: Mode, files: RunFiles, experiment: TrackingExperiment, artifact: Artifact, variant: Variant
-) -> RunDocuments:
+def run_documents(mode: Mode, files: RunFiles, setup: RunSetup) -> RunDocuments:
     """What the log of a run says of it before the first sample.
 
     Args:
         mode: how the run was made.
         files: of the run.
-        experiment, artifact, variant: as those of `track`.
+        setup: what ran.
     """
-    header = RunHeader(mode=mode, controller=variant.controller)
-    return RunDocuments(header, artifact, experiment.trajectory, read_scenario(files.scenario))
+    header = RunHeader(mode=mode, controller=setup.row.controller)
+    return RunDocuments(header, setup.artifact, setup.experiment.trajectory, read_scenario(files.scenario))
 
 
 def run_from_columns(columns: dict[str, FloatArray], joints: int, sample_period_s: float) -> Run:
@@ -273,24 +196,16 @@ def run_from_columns(columns: dict[str, FloatArray], joints: int, sample_period_
     )
 
 
-def summarise(
-    run: Run,
-    experiment: TrackingExperiment,
-    artifact: Artifact,
-    *,
-    plant: PlantKind,
-    sensors: Sensors,
-    variant: Variant | None = None,
-) -> TrackResult:
-    """The numbers of a run, however it was made; arguments as those of `track`."""
+def summarise(run: Run, setup: RunSetup) -> TrackResult:
+    """The numbers of a run, however it was made."""
     return summarise_as(
         run,
-        experiment.name,
-        experiment.robot.model,
-        artifact,
-        plant=plant,
-        sensors=sensors,
-        variant=variant or variant_of(artifact, sensors),
+        setup.experiment.name,
+        setup.experiment.robot.model,
+        setup.artifact,
+        plant=setup.plant,
+        sensors=setup.sensors,
+        variant=setup.row,
     )
 
 
@@ -304,13 +219,13 @@ def summarise_as(
     sensors: Sensors,
     variant: Variant,
 ) -> TrackResult:
-    """The numbers of a run that is known by its name and its robot only; other arguments as those of `track`.
+    """The numbers of a run that is known by its name and its robot only; other arguments as of `RunSetup`.
 
     Args:
         run: the record.
         name: of the experiment.
         mechanism: what moves the tool; its masses do not matter.
-        artifact, plant, sensors, variant: as those of `track`.
+        artifact, plant, sensors, variant: as of `RunSetup`; the plant by its label.
     """
 
     def tool_position(angle: FloatArray) -> FloatArray:
@@ -332,12 +247,6 @@ def summarise_as(
         true_disturbance=true_disturbance(run, artifact, runtime),
         envelope=OperatingEnvelope.of(artifact),
     )
-
-
-def variant_of(artifact: Artifact, sensors: Sensors) -> Variant:
-    """All there is to say of an artifact of unknown origin."""
-    compensated = getattr(artifact.law, "disturbance_compensation", True)
-    return Variant(artifact.law.kind, sensors.encoder_bits, compensated)
 
 
 def worst_growth_rate(artifact: Artifact) -> float | None:

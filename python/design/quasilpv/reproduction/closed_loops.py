@@ -19,9 +19,10 @@ from quasilpv.artifact.laws import DobTorqueLaw
 from quasilpv.experiments.designs import kept_design
 from quasilpv.experiments.metrics import Metrics
 from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.track import TrackingExperiment, track
-from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
+from quasilpv.scenarios import Sensors, tracking_experiment
+from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.arms import PlanarSerialArm
 from quasilpv.systems.robots.registry import Robot
 
@@ -105,12 +106,16 @@ def outcome(loop: ClosedLoop) -> Outcome:
     Raises:
         InfeasibleError, ClaimError: the controller cannot be designed.
     """
-    experiment = TrackingExperiment.registered(loop.scenario)
+    experiment = tracking_experiment(loop.scenario)
     artifact = kept_design(
-        experiment.robot.id,
-        loop.controller,
-        Specification(rate_hz=loop.rate_hz, disturbance_frequency_rad_s=experiment.robot.disturbance_frequency_rad_s),
-        disturbance_compensation=loop.observer != "without compensation",
+        DesignRequest.of(
+            experiment.robot.id,
+            loop.controller,
+            Specification(
+                rate_hz=loop.rate_hz, disturbance_frequency_rad_s=experiment.robot.disturbance_frequency_rad_s
+            ),
+            compensated=loop.observer != "without compensation",
+        )
     )
     if loop.observer == "without disturbance":
         artifact = without_disturbance_states(artifact)
@@ -119,7 +124,7 @@ def outcome(loop: ClosedLoop) -> Outcome:
     plant: Literal["nominal", "perturbed"] = "perturbed" if loop.plant == "perturbed" else "nominal"
     variant = Variant(loop.controller, loop.sensors.encoder_bits, loop.observer == "whole")
     with TemporaryDirectory() as folder:
-        result = track(experiment, artifact, Path(folder), plant=plant, sensors=loop.sensors, variant=variant)
+        result = track(RunSetup(experiment, artifact, plant=plant, sensors=loop.sensors, variant=variant), Path(folder))
     return Outcome(loop, artifact, result)
 
 

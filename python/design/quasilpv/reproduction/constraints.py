@@ -15,9 +15,8 @@ import numpy as np
 from quasilpv import _runtime
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.experiments.run import FloatArray
-from quasilpv.experiments.track import TrackingExperiment
 from quasilpv.reproduction.closed_loops import Outcome
-from quasilpv.scenarios import build_scenario
+from quasilpv.scenarios import build_scenario, tracking_experiment
 from quasilpv.systems.robots.fivebar import RhombicFiveBar
 from quasilpv.systems.robots.rolling_disc import RollingDisc
 
@@ -92,7 +91,7 @@ def rolling_along(closed_loop: Outcome) -> tuple[Replay, Constraint]:
 
 def _scenario(closed_loop: Outcome) -> tuple[dict[str, Any], Any]:
     """The scenario of a run as a document that may be changed, and the model of its robot."""
-    loop, experiment = closed_loop.loop, TrackingExperiment.registered(closed_loop.loop.scenario)
+    loop, experiment = closed_loop.loop, tracking_experiment(closed_loop.loop.scenario)
     scenario = build_scenario(
         experiment.robot,
         experiment.trajectory,
@@ -108,7 +107,7 @@ def _scenario(closed_loop: Outcome) -> tuple[dict[str, Any], Any]:
 def _replayed(closed_loop: Outcome, document: dict[str, Any]) -> tuple[Replay, _runtime.Plant]:
     """Close the loop on a scenario and integrate its plant again."""
     scenario = _runtime.Scenario.parse(canonical_json(document))
-    trajectory = TrackingExperiment.registered(closed_loop.loop.scenario).trajectory
+    trajectory = tracking_experiment(closed_loop.loop.scenario).trajectory
     columns = _runtime.run_closed_loop(
         _runtime.Artifact.parse(canonical_json(closed_loop.artifact.to_document())),
         _runtime.Trajectory.parse(canonical_json(trajectory.to_document())),

@@ -17,7 +17,7 @@ from quasilpv.reproduction.observers.eigenvalue_bounds import Bound
 from quasilpv.reproduction.observers.speed_estimates import Observer, speed_errors
 from quasilpv.reproduction.observers.speed_observer import SpeedObserver, speed_observer
 from quasilpv.reproduction.observers.velocity_classes import VelocityClasses
-from quasilpv.scenarios import tracking_task
+from quasilpv.scenarios import tracking_experiment
 from quasilpv.systems.robots.registry import robot
 
 GAMMA_2 = (-75.0, -25.0, 25.0, 75.0)
@@ -180,7 +180,7 @@ def _study(effort: Effort) -> Finding:
 def _simulated(proved: SpeedObserver, effort: Effort) -> tuple[FloatArray, dict[str, dict[str, FloatArray]]]:
     """Times, (N,), and the error of the estimated speeds on the square, (N, 3), by plant and observer."""
     arm = robot("arm3")
-    trajectory = tracking_task("serial-square").trajectory(arm.model, arm.domain)
+    trajectory = tracking_experiment("serial-square").by(arm).trajectory
     time_s = np.arange(0.0, trajectory.duration_s if effort is Effort.FULL else 1.0, STEP_S[effort])
 
     def motion(t: float) -> tuple[FloatArray, FloatArray, FloatArray]:

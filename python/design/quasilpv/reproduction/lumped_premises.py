@@ -15,13 +15,14 @@ from typing import Any
 
 from quasilpv.errors import InfeasibleError
 from quasilpv.experiments.result import TrackResult
-from quasilpv.experiments.track import PlantKind, TrackingExperiment, track
+from quasilpv.experiments.setup import PlantKind, RunSetup
+from quasilpv.experiments.track import track
 from quasilpv.figures.partition import Column, speed_estimates_by_partition, tracking_by_partition
 from quasilpv.release import checked_artifact
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.item import Check, Effort, Finding, Item
-from quasilpv.scenarios import Sensors
-from quasilpv.synthesis import Specification, synthesise
+from quasilpv.scenarios import Sensors, tracking_experiment
+from quasilpv.synthesis import DesignRequest, Specification, synthesise
 from quasilpv.synthesis.acceleration.lumped_premises import lumped_acceleration_law, with_premises_lumped
 from quasilpv.synthesis.inertia_schedule import schedule_of
 from quasilpv.synthesis.torque.design import TorqueBandwidth, torque_design_at
@@ -88,9 +89,10 @@ class Partitioned:
 
         def run(scenario: str, plant: PlantKind, delay_s: float) -> TrackResult:
             with TemporaryDirectory() as folder:
-                experiment = TrackingExperiment.registered(scenario)
+                experiment = tracking_experiment(scenario)
                 return track(
-                    experiment, artifact, Path(folder), plant=plant, sensors=Sensors(), transport_delay_s=delay_s
+                    RunSetup(experiment, artifact, plant=plant, sensors=Sensors(), transport_delay_s=delay_s),
+                    Path(folder),
                 )
 
         return cls(
@@ -118,7 +120,7 @@ class Partitioned:
 def at_one_bandwidth(effort: Effort) -> Mapping[str, Partitioned]:
     """`dob-acceleration` as released (three premises), and its scalars on every other partition."""
     arm = robot("arm3")
-    released = synthesise(arm, specification=ACCELERATION)
+    released = synthesise(DesignRequest.of(arm, specification=ACCELERATION))
     designs = {name: with_premises_lumped(released, schedule_of(arm, kept)) for name, kept in PARTITIONS.items()}
     return {name: Partitioned.of(design, effort) for name, design in designs.items()}
 

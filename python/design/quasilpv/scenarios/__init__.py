@@ -1,12 +1,14 @@
 """Scenarios: an experiment the simulator can run, true plant included (``docs/reference/formats.md``).
 
-Three parts: the documents (`schema`), the experiments known by name (`registry`), and the way from a robot and a
-reference to an experiment (`builder`). Encoders have 20 bits; the measured speed, which only the baseline laws read,
-carries white noise.
+Four parts: the documents (`schema`), what is tracked by which robot (`experiment`), the experiments known by name
+(`registry`), and the way from a robot and a reference
+to a document (`builder`). Encoders have 20 bits; the measured speed, which only the baseline laws read, carries white
+noise.
 """
 
 from quasilpv.scenarios.builder import build_scenario
-from quasilpv.scenarios.registry import EXTERNAL_TORQUE, TrackingTask, motions_of, tracking_task, tracking_tasks
+from quasilpv.scenarios.experiment import TrackingExperiment
+from quasilpv.scenarios.registry import EXTERNAL_TORQUE, motions_of, tracking_experiment, tracking_experiments
 from quasilpv.scenarios.schema import (
     NOISE_SEED,
     OPTIONAL,
@@ -35,12 +37,12 @@ __all__ = [
     "Scenario",
     "Sensors",
     "SineTorque",
-    "TrackingTask",
+    "TrackingExperiment",
     "build_scenario",
     "motions_of",
     "read_scenario",
     "sine_torques",
-    "tracking_task",
-    "tracking_tasks",
+    "tracking_experiment",
+    "tracking_experiments",
     "write_scenario",
 ]

@@ -8,65 +8,41 @@ or 50 t; on the nominal robot or with the payload of chapter IV.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from quasilpv.errors import InputError, one_of
-from quasilpv.scenarios.schema import SineTorque, Vector, sine_torques
+from quasilpv.scenarios.experiment import Planner, TrackingExperiment
+from quasilpv.scenarios.schema import sine_torques
 from quasilpv.synthesis.actuator_demand import Motion
-from quasilpv.systems.robots.arm_parameters import OperatingDomain
-from quasilpv.systems.robots.registry import Robot
-from quasilpv.trajectories import Trajectory, fivebar_spiral, rest, serial_circle, serial_square
-from quasilpv.trajectories.planned import Kinematics
+from quasilpv.systems.robots.registry import Robot, robot
+from quasilpv.trajectories import fivebar_spiral, rest, serial_circle, serial_square
 
 EXTERNAL_TORQUE = sine_torques((450.0, 15.0), (375.0, 15.0), (300.0, 15.0))
 """The disturbance of Dehak 2022 (III.53): joint torques, added to the control torque as they are."""
 
 
-@dataclass(frozen=True)
-class TrackingTask:
-    """An entry of the registry: a robot by name and the reference it tracks.
-
-    Attributes:
-        id: its name.
-        summary: one line for a listing.
-        robot: id of a robot.
-        trajectory: from the robot and its operating domain to the reference.
-        external_torque: sines on the joints.
-        initial_angle_rad: angles of the plant at t = 0; None to start on the reference.
-        initial_speed_rad_s: its speeds then; None for rest. Only with angles.
-    """
-
-    id: str
-    summary: str
-    robot: str
-    trajectory: Callable[[Kinematics, OperatingDomain | None], Trajectory]
-    external_torque: tuple[SineTorque, ...] = ()
-    initial_angle_rad: Vector | None = None
-    initial_speed_rad_s: Vector | None = None
-
-
-def _serial(name: str, summary: str, trajectory: Callable[..., Trajectory]) -> TrackingTask:
+def _serial(name: str, summary: str, planner: Planner) -> TrackingExperiment:
     """A path of the 3-DoF arm under (III.53)."""
-    return TrackingTask(name, summary, "arm3", trajectory, EXTERNAL_TORQUE)
+    return TrackingExperiment(name, robot("arm3"), planner, EXTERNAL_TORQUE, summary=summary)
 
 
-def _stabilisation(name: str, summary: str, robot_id: str, joints: int) -> TrackingTask:
+def _stabilisation(name: str, summary: str, robot_id: str, joints: int) -> TrackingExperiment:
     """From rest with the first joint at 22.5 degrees (Dehak 2022, fig. I.2), the reference being theta = 0 for 5 s."""
     start = (math.pi / 8.0,) + (0.0,) * (joints - 1)
-    return TrackingTask(name, summary, robot_id, lambda _, __: rest(name, joints, 5.0), (), start)
+    return TrackingExperiment(
+        name, robot(robot_id), lambda _, __: rest(name, joints, 5.0), initial_angle_rad=start, summary=summary
+    )
 
 
-def _spiral(name: str, disturbance: str, *terms: tuple[float, float]) -> TrackingTask:
+def _spiral(name: str, disturbance: str, *terms: tuple[float, float]) -> TrackingExperiment:
     """The spiral of the five-bar robot under one reading of (IV.77), or a stronger disturbance."""
     summary = f"the five-bar robot draws a spiral in 5 s, disturbed by {disturbance}"
-    return TrackingTask(name, summary, "fivebar", fivebar_spiral, sine_torques(*terms))
+    return TrackingExperiment(name, robot("fivebar"), fivebar_spiral, sine_torques(*terms), summary=summary)
 
 
-def tracking_tasks() -> tuple[TrackingTask, ...]:
-    """Return all tracking experiments, in a fixed order."""
+def tracking_experiments() -> tuple[TrackingExperiment, ...]:
+    """Return all tracking experiments, in a fixed order; none is planned before its trajectory is asked for."""
     return (
         _serial("serial-square", "the 3-DoF arm draws a square of 0.4 m in 3 s", serial_square),
         _serial("serial-circle", "the 3-DoF arm draws 3/4 of a circle of 0.2 m in 3 s", serial_circle),
@@ -76,43 +52,44 @@ def tracking_tasks() -> tuple[TrackingTask, ...]:
         _stabilisation("stabilise-arm2", "the hanging 2-DoF arm comes to rest from 22.5 degrees", "arm2", 2),
         _stabilisation("stabilise-arm2-upright", "the same around its upper equilibrium", "arm2-upright", 2),
         _stabilisation("stabilise-arm3", "the light 3-DoF arm comes to rest from 22.5 degrees", "arm3-light", 3),
-        TrackingTask(
+        TrackingExperiment(
             "stabilise-spring-disc",
-            "the disc comes to rest from x_1 = -5 m, x_2 = 10 m/s (Dehak 2022, fig. III.4)",
-            "spring-disc",
+            robot("spring-disc"),
             lambda _, __: rest("stabilise-spring-disc", 1, 10.0),
-            (),
             initial_angle_rad=(-2.5,),
             initial_speed_rad_s=(5.0,),
+            summary="the disc comes to rest from x_1 = -5 m, x_2 = 10 m/s (Dehak 2022, fig. III.4)",
         ),
     )
 
 
-def tracking_task(name: str) -> TrackingTask:
+def tracking_experiment(name: str) -> TrackingExperiment:
     """Return the tracking experiment of that name.
 
     Raises:
         InputError: there is none; the message lists those there are.
     """
-    known = {task.id: task for task in tracking_tasks()}
+    known = {experiment.name: experiment for experiment in tracking_experiments()}
     if name not in known:
         raise InputError("scenarios", "scenario", name, one_of(known, name))
     return known[name]
 
 
-def motions_of(robot: Robot, sample_period_s: float = 0.02) -> tuple[Motion, ...]:
+def motions_of(source: Robot, sample_period_s: float = 0.02) -> tuple[Motion, ...]:
     """What the registered experiments ask of a robot: their references and the peaks of their external torques."""
     motions = []
-    for task in tracking_tasks():
-        if task.robot != robot.id:
+    for experiment in tracking_experiments():
+        if experiment.robot.id != source.id:
             continue
-        trajectory = task.trajectory(robot.model, robot.domain)
+        trajectory = experiment.by(source).trajectory
         reference = trajectory.evaluate(np.arange(0.0, trajectory.duration_s, sample_period_s))
-        peak, rate = np.zeros((2, robot.model.joints))
-        for term in task.external_torque:
+        peak, rate = np.zeros((2, source.model.joints))
+        for term in experiment.external_torque:
             peak[term.joint] += abs(term.amplitude_nm)
             rate[term.joint] += abs(term.amplitude_nm * term.frequency_rad_s)
         motions.append(
-            Motion(task.id, reference.angle, reference.speed, reference.acceleration, peak, rate, sample_period_s)
+            Motion(
+                experiment.name, reference.angle, reference.speed, reference.acceleration, peak, rate, sample_period_s
+            )
         )
     return tuple(motions)

@@ -1,0 +1,113 @@
+"""The controllers known by name.
+
+The registry is read by help pages: an entry says where its design is, which is imported when one is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from quasilpv.errors import InputError, one_of
+from quasilpv.synthesis.progress import Progress
+from quasilpv.synthesis.specification import Specification
+
+if TYPE_CHECKING:
+    from quasilpv.synthesis.tracking_design import TrackingDesign
+    from quasilpv.systems.robots.registry import Robot
+
+
+@dataclass(frozen=True)
+class ControllerKind:
+    """An entry of the registry of controllers.
+
+    Attributes:
+        summary: one line for a listing.
+        function: from robot, specification and progress to a design: ``module.name`` in this room.
+        rate_hz: sample rate if nobody asks for another.
+    """
+
+    summary: str
+    function: str
+    rate_hz: float = 1000.0
+
+    def design(self, robot: Robot, specification: Specification, progress: Progress) -> TrackingDesign:
+        """Design it; see `synthesise`."""
+        module, _, name = self.function.rpartition(".")
+        design: Callable[[Robot, Specification, Progress], TrackingDesign]
+        design = getattr(import_module(f"quasilpv.synthesis.{module}"), name)
+        return design(robot, specification, progress)
+
+
+CONTROLLERS: Mapping[str, ControllerKind] = {
+    "pid": ControllerKind(
+        "PID with feedforward, gains of Dehak 2022 (III.55), measured speeds", "baselines.printed.pid"
+    ),
+    "ctc": ControllerKind(
+        "computed torque, gains of Dehak 2022 (III.57), measured speeds", "baselines.printed.computed_torque"
+    ),
+    "ctc-dob": ControllerKind(
+        "computed torque with a disturbance observer (Mohammadi et al. 2013), measured speeds",
+        "baselines.printed.computed_torque_with_observer",
+    ),
+    "pid-tuned": ControllerKind("pid, tuned as dob-acceleration is", "baselines.tuned.pid_tuned"),
+    "ctc-tuned": ControllerKind("ctc, tuned as dob-acceleration is", "baselines.tuned.computed_torque_tuned"),
+    "ctc-dob-tuned": ControllerKind(
+        "ctc-dob, tuned as dob-acceleration is", "baselines.tuned.computed_torque_with_observer_tuned"
+    ),
+    "hinf-tracking": ControllerKind(
+        "H-infinity PI tracking with limited gains (Dehak 2022, Theorem III.10), measured speeds, no feedforward",
+        "hinf.hinf_tracking",
+        rate_hz=4000.0,
+    ),
+    "pdc": ControllerKind(
+        "stabilises theta = 0: scheduled state feedback of least gain (Dehak 2022, Theorem I.2), measured speeds",
+        "stabilising.laws.pdc",
+    ),
+    "descriptor": ControllerKind(
+        "stabilises theta = 0: descriptor law of least gain (Dehak 2022, Theorem II.6), measured speeds",
+        "stabilising.laws.descriptor",
+        rate_hz=4000.0,
+    ),
+    "robust": ControllerKind(
+        "stabilises theta = 0 with unknown inertia: feedback of least gain (Dehak 2022, Theorem III.9), speeds too",
+        "stabilising.laws.robust",
+    ),
+    "delayed": ControllerKind(
+        "stabilises theta = 0: descriptor law with a moving window (Dehak 2022, Theorem II.8), measured speeds",
+        "stabilising.laws.delayed",
+    ),
+    "dob-torque": ControllerKind(
+        "disturbance-observer tracking at the torque level (Dehak 2022, Theorem IV.11), positions only",
+        "torque.law.torque_law",
+        rate_hz=4000.0,
+    ),
+    "dob-torque-premultiplied": ControllerKind(
+        "dob-torque for the equations of motion times the robot's own matrix beta (Dehak 2022, IV.5.2)",
+        "torque.law.premultiplied_torque_law",
+        rate_hz=4000.0,
+    ),
+    "dob-moving": ControllerKind(
+        "dob-acceleration with one Lyapunov function for all motions, proved; positions only",
+        "acceleration.law.moving_acceleration_law",
+    ),
+    "dob-acceleration": ControllerKind(
+        "disturbance-observer tracking at the acceleration level, positions only (default)",
+        "acceleration.law.acceleration_law",
+    ),
+}
+
+DEFAULT_CONTROLLER = "dob-acceleration"
+
+
+def controller_kind(controller: str) -> ControllerKind:
+    """The controller of that name.
+
+    Raises:
+        InputError: there is none; the message lists those there are.
+    """
+    if controller not in CONTROLLERS:
+        raise InputError("controllers", "controller", controller, one_of(CONTROLLERS, controller))
+    return CONTROLLERS[controller]
