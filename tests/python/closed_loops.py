@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.condition import Condition, Feedback, Options, Statement
 from quasilpv.lmi import Problem
 from quasilpv.lmi.compiled import CompiledProblem
@@ -19,8 +19,6 @@ from quasilpv.lmi.feasibility import Decision, decide
 from quasilpv.polytopes import polytopic_model
 from quasilpv.systems.catalogue import system
 from quasilpv.systems.descriptor.system import DescriptorSystem
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def stated(

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import sympy as sp
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.condition import Options
 from quasilpv.systems.descriptor.premise import AffineMatrix
 from quasilpv.systems.descriptor.system import DescriptorSystem
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def rescaled(system: DescriptorSystem, options: Options, seed: int) -> tuple[DescriptorSystem, Options]:

@@ -10,11 +10,11 @@ import pytest
 from numpy.testing import assert_allclose
 from PIL import Image
 
+from quasilpv.arrays import FloatArray
 from quasilpv.cli import run
 from quasilpv.errors import InputError
 from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.animation import FRAMES_PER_SECOND, LAST_FRAME_S, Film, write_animation
 from quasilpv.systems.robots.mechanism import PlanarMechanism
 from quasilpv.systems.robots.registry import robot

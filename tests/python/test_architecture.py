@@ -13,7 +13,7 @@ PACKAGE = ROOT / "python" / "design" / "quasilpv"
 
 # Every room of the package, lowest layer first. A room imports itself and the layers below its own.
 LAYERS = (
-    {"", "errors", "defaults"},
+    {"", "arrays", "defaults", "errors", "progress"},
     {"files"},
     {"documents"},
     {"systems"},

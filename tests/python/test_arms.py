@@ -387,7 +387,7 @@ def test_when_link_parameter_is_out_of_range_expect_its_name(field: str, value: 
         ({"links": ()}, "at least one link"),
         ({"gravity_m_s2": -9.81}, "gravity_m_s2"),
         ({"equilibrium": "sideways"}, "hanging or upright"),
-        ({"links": ARM3.links[:1]}, "christoffel unless n = 2 or 3"),
+        ({"links": ARM3.links[:1]}, "2 or 3, the arms of the source"),
     ],
 )
 def test_when_arm_is_not_well_defined_expect_refusal(changes: dict, words: str) -> None:

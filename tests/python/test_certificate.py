@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from flint import fmpq, fmpq_mat
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate import verify
 from quasilpv.certificate.claims import Claim
 from quasilpv.certificate.exact_matrices import is_positive_definite, matrix, rational, scaled_to_unit_diagonal
@@ -28,7 +28,6 @@ from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
 from quasilpv.synthesis import DesignRequest, Specification
 
-FloatArray = npt.NDArray[np.float64]
 Document = dict[str, Any]
 POINTS = 5000
 ROUNDING = 1e-9

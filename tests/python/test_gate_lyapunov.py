@@ -9,12 +9,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from flint import fmpq
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact_matrices import matrix, rational
 from quasilpv.certificate.gate import robust_gate
 from quasilpv.certificate.gate_data import loop_data
@@ -31,7 +31,6 @@ from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw
 from quasilpv.systems.robots.registry import robot
 from reference.gated_arms import full_map, moving_design, moving_five_bar, multiple_pole_loop, quotients
 
-FloatArray = npt.NDArray[np.float64]
 Document = dict[str, Any]
 
 LOOP = multiple_pole_loop(60, 1200, 1e-3, 1e-3)

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from flint import fmpq
 
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact, write_artifact
 from quasilpv.certificate import gate
 from quasilpv.certificate.grid_gate import GridGate, frozen_torque_law, grid_gate, growth_curves
@@ -28,7 +28,6 @@ from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 from reference.step import DobTorque, OutputStage, Sample
 
-FloatArray = npt.NDArray[np.float64]
 Document = dict[str, Any]
 
 RATE_HZ = 4000.0

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quasilpv.arrays import FloatArray
 from quasilpv.experiments.fault import NUMBERS, Fault, fault_of
-from quasilpv.experiments.run import FloatArray
 from quasilpv.telemetry.codes import FAULT, FAULT_CAUSES, RUNNING
 from reference.runs import synthetic_run
 

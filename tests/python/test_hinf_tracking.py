@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate import CHECKERS, gate, verify
 from quasilpv.certificate.grid_gate import frozen_hinf_law
 from quasilpv.certificate.hinf_law import unknown_terms
@@ -32,7 +32,6 @@ from quasilpv.synthesis.torque.schedule import full_schedule
 from quasilpv.systems.robots.registry import robot
 from reference.mutants import BLOCKS, Mutant
 
-FloatArray = npt.NDArray[np.float64]
 Document = dict[str, Any]
 
 RATE_HZ = 4000.0

@@ -5,13 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.tracking.iii10 import TrackingCondition, tracking_condition
 from quasilpv.lmi import Solution
 from quasilpv.polytopes import BlockPolytope
-
-FloatArray = npt.NDArray[np.float64]
 
 DECAY, GAIN_LIMIT = 1.0, 1000.0
 FREQUENCIES = np.concatenate([[0.0], np.geomspace(1e-2, 1e3, 200)])

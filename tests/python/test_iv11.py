@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.tracking.iv11_literal import literal_feedback, literal_observer
 from quasilpv.conditions.tracking.iv11_reduced import (
     FeedbackPoint,
@@ -19,8 +20,6 @@ from quasilpv.conditions.tracking.iv11_reduced import (
 )
 from quasilpv.lmi import Problem, to_rational
 from quasilpv.polytopes import BlockPolytope
-
-FloatArray = npt.NDArray[np.float64]
 
 DECAY, DISK, NOISE = 0.1, 2.0, 0.1
 FREQUENCIES = np.concatenate([[0.0], np.geomspace(1e-3, 1e2, 120)])

@@ -11,13 +11,13 @@ from collections import Counter
 from enum import StrEnum
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import scipy.integrate
 import scipy.linalg
 import sympy as sp
 
 from closed_loops import premises, worst_rate
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.condition import Feedback, Options
 from quasilpv.conditions.registry import CONDITIONS, condition
 from quasilpv.errors import InputError
@@ -26,8 +26,6 @@ from quasilpv.lmi.feasibility import decide
 from quasilpv.polytopes import polytopic_model
 from quasilpv.systems.descriptor.premise import AffineMatrix, Premise, PremiseKind
 from quasilpv.systems.descriptor.system import DescriptorSystem
-
-FloatArray = npt.NDArray[np.float64]
 
 ANALYSIS = {"I.1"}
 SAMPLED = {"sampled-feedback", "sampled-observer", "estimated-observer"}

@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi import Expression, Outcome, Problem, Variable, constant, he, largest_margin, scaling_report, zeros
 from quasilpv.lmi.backends import BackendName
-
-FloatArray = npt.NDArray[np.float64]
 
 SOLVERS: tuple[tuple[BackendName, str | None], ...] = (("clarabel", None), ("cvxpy", "CLARABEL"), ("cvxpy", "CVXOPT"))
 BAND = 0.01

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import sympy as sp
 from scipy.linalg import null_space, solve_continuous_lyapunov
 
+from quasilpv.arrays import FloatArray
 from quasilpv.polytopes import BlockPolytope
 
-FloatArray = npt.NDArray[np.float64]
 SEEDS = range(8)
 
 

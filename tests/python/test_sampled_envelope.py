@@ -9,12 +9,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from flint import fmpq_mat
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate import verify
 from quasilpv.certificate.gate_data import loop_data
 from quasilpv.certificate.sampled_envelope import ErrorDynamics
@@ -25,7 +25,6 @@ from quasilpv.synthesis import DesignRequest
 from quasilpv.synthesis.acceleration.envelope import acceleration_envelope
 from quasilpv.systems.robots.registry import robot
 
-FloatArray = npt.NDArray[np.float64]
 Document = dict[str, Any]
 SAMPLES = 4000
 seeds = st.integers(0, 2**32 - 1)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -38,8 +37,6 @@ from reference.shipped_laws import (
     chain_document,
     torque_document,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 # SCS, a first-order method, is asked for a feasible point only: near the optimum it runs out of iterations.
 PEERS: tuple[tuple[BackendName, str | None, bool], ...] = (

@@ -9,11 +9,11 @@ from functools import cache
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import scipy.integrate
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact, evaluate
 from quasilpv.certificate import gate, verify
 from quasilpv.certificate.robot_dynamics import gravity_stiffness, robot_dynamics
@@ -21,17 +21,15 @@ from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.state_law import StateLaw
+from quasilpv.progress import no_progress
 from quasilpv.release import to_artifact
 from quasilpv.scenarios import Sensors, build_scenario, tracking_experiment
-from quasilpv.synthesis.progress import no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.stabilising.laws import DECAY_PER_S, stabilisation
 from quasilpv.systems.catalogue import system
 from quasilpv.systems.robots.registry import robot, spring_disc
 from quasilpv.systems.robots.rolling_disc import RollingDisc
 from quasilpv.trajectories import Trajectory
-
-FloatArray = npt.NDArray[np.float64]
 
 DESIGNS = [
     ("arm2", "pdc"),

@@ -7,10 +7,10 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact
 from quasilpv.documents.canonical import canonical_cbor, canonical_json
 from quasilpv.errors import InfeasibleError
@@ -27,8 +27,6 @@ from quasilpv.synthesis.torque.law import tracking_design
 from quasilpv.synthesis.torque.schedule import ScheduledPlants, schedule
 from quasilpv.systems.robots.registry import robot
 from reference.step import DobTorque, OutputStage, Sample
-
-FloatArray = npt.NDArray[np.float64]
 
 RATE_HZ = 4000.0
 

@@ -7,18 +7,17 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate import verify
 from quasilpv.errors import InputError
 from quasilpv.release import release
 from quasilpv.synthesis import DesignRequest, Specification
 
-FloatArray = npt.NDArray[np.float64]
 Document = dict[str, Any]
 seeds = st.integers(0, 2**32 - 1)
 STEPS = 40

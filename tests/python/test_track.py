@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact
 from quasilpv.certificate import verify
 from quasilpv.documents.canonical import canonical_json
@@ -21,7 +22,6 @@ from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.hil import merge_records, read_record, require_identical, run_over_lcm
 from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import TrackResult
-from quasilpv.experiments.run import FloatArray
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.experiments.track import run_from_columns, track
 from quasilpv.release import release

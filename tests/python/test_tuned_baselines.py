@@ -6,13 +6,14 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from quasilpv import scenarios
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.velocity_law import VelocityLaw
+from quasilpv.progress import no_progress
 from quasilpv.release import Release, release
 from quasilpv.synthesis import CONTROLLERS, DesignRequest, Specification, specification
 from quasilpv.synthesis.acceleration.design import design_acceleration_law
@@ -20,12 +21,9 @@ from quasilpv.synthesis.baselines import printed as baselines
 from quasilpv.synthesis.baselines import tuned as tuned_baselines
 from quasilpv.synthesis.baselines import tuning_search
 from quasilpv.synthesis.plant_grid import PlantGrid
-from quasilpv.synthesis.progress import no_progress
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.registry import robot
 from reference.step import ComputedTorque, OutputStage, Pid, Sample, SpeedFilter
-
-FloatArray = npt.NDArray[np.float64]
 
 TUNED = ("pid-tuned", "ctc-tuned", "ctc-dob-tuned")
 T = 1e-3

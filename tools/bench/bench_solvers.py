@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi.assembly import triangle_places
 from quasilpv.lmi.compiled import CompiledProblem, rounded
 from quasilpv.lmi.layout import Layout
 from quasilpv.studies import Verdict
 
-FloatArray = npt.NDArray[np.float64]
 Found: TypeAlias = tuple[FloatArray | None, bool]
 """A candidate, if there is one, and whether the solver says that the problem is infeasible."""
 

@@ -6,8 +6,11 @@ never an exception of this module.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from typing import TypeVar
+
+T = TypeVar("T")
 
 MOST_NAMES = 20
 
@@ -53,6 +56,22 @@ def one_of(names: Iterable[str], got: str, listed_by: str = "design list") -> st
         return f"{', '.join([*close, 'one' if not close else 'or another'])} of {listed_by}"
     listed = f"one of {', '.join(known)}"
     return f"{listed}; did you mean {close[0]}?" if close else listed
+
+
+def look_up(known: Mapping[str, T], name: str, source: str, field: str) -> T:
+    """What a name stands for.
+
+    Args:
+        known: by name.
+        name: the one that is looked up.
+        source, field: of the error.
+
+    Raises:
+        InputError: there is none of this name; the message lists those there are.
+    """
+    if name not in known:
+        raise InputError(source, field, name, one_of(known, name))
+    return known[name]
 
 
 class PlantError(QuasilpvError):

@@ -20,10 +20,10 @@ from quasilpv.certificate import CHECKERS, Evidence, gate, verify
 from quasilpv.documents.canonical import document_hash
 from quasilpv.documents.robot import ARTIFACT_VERSION
 from quasilpv.errors import ClaimError
+from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis import DesignRequest, synthesise
 from quasilpv.synthesis.actuator_demand import MotionsOf, no_motions, unmet_demands
 from quasilpv.synthesis.baselines.printed import reference_speeds
-from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.registry import Robot
 

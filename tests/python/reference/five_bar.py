@@ -11,12 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
+from quasilpv.arrays import FloatArray
 from reference.serial_arm import Link, Sine
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def along(angle: float) -> FloatArray:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact, evaluate
 from quasilpv.certificate.vertex_tables import VertexTable
 from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
@@ -25,7 +25,6 @@ from reference.step import (
     SpeedFilter,
 )
 
-FloatArray = npt.NDArray[np.float64]
 Torque = Callable[[float], FloatArray]
 Law = DobAcceleration | DobTorque | Pid | ComputedTorque
 

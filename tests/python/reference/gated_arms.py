@@ -7,8 +7,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.gate_data import loop_data
 from quasilpv.certificate.gate_loop import AccelerationLoopData
 from quasilpv.release import to_artifact
@@ -17,8 +17,6 @@ from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, pr
 from quasilpv.systems.robots.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
 from quasilpv.systems.robots.arms import PlanarSerialArm
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def multiple_pole_loop(wc: float, wo: float, filter_s: float, T: float) -> AccelerationLoopData:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from quasilpv.arrays import FloatArray
 from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import Disturbance, TrackResult, Variant
-from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.experiments.run import Run
 
 
 def synthetic_run(samples: int, joints: int) -> Run:

@@ -12,9 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from quasilpv.arrays import FloatArray
+
 Model = Callable[[FloatArray], FloatArray]
 SpeedModel = Callable[[FloatArray, FloatArray], FloatArray]
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from flint import fmpq
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.claims import Evidence
 from quasilpv.certificate.gate_data import HALF_A_SAMPLE, inertia_data, law_kind
 from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_range
@@ -23,7 +24,7 @@ from quasilpv.certificate.gate_rationals import to_float
 from quasilpv.certificate.program_values import program_values
 from quasilpv.certificate.robot_dynamics import gravity_stiffness
 from quasilpv.certificate.vertex_tables import VertexTable
-from quasilpv.loops.frozen_loop import FloatArray, FrozenLaw
+from quasilpv.loops.frozen_loop import FrozenLaw
 from quasilpv.loops.hinf_law import hinf_tracking_law
 from quasilpv.loops.loop_grid import PAYLOAD_FRACTIONS, LoopGrid, WorstLoop, configurations
 from quasilpv.loops.state_law import StateLaw, descriptor_gain

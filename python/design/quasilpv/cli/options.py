@@ -11,8 +11,8 @@ import typer
 
 from quasilpv.defaults import DEFAULT_FORMATS, ENCODER_BITS
 from quasilpv.errors import InputError, one_of
+from quasilpv.progress import Progress
 from quasilpv.synthesis import CONTROLLERS, ControllerKind, DesignRequest, Specification, specification_for
-from quasilpv.synthesis.progress import Progress
 
 if TYPE_CHECKING:
     from quasilpv.artifact import Artifact

@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.choices import Form as Form  # noqa: PLC0414 -- also from here
 from quasilpv.conditions.choices import Slack
 from quasilpv.conditions.forms.blocks import double_sum, single_sum
@@ -21,7 +22,6 @@ from quasilpv.lmi import Expression, Problem, Variable
 from quasilpv.polytopes import PolytopicModel
 from quasilpv.polytopes.units import Units
 
-FloatArray = npt.NDArray[np.float64]
 Values: TypeAlias = Mapping[Variable, FloatArray]
 
 

@@ -10,13 +10,11 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.polytopes.block_polytope import BlockPolytope
 from quasilpv.polytopes.units import Units
 from quasilpv.systems.descriptor.premise import AffineMatrix
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Gain(Protocol):

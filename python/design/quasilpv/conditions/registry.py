@@ -21,7 +21,7 @@ from quasilpv.conditions.theorems import (
     tanaka_wang,
     ts_pj,
 )
-from quasilpv.errors import InputError, one_of
+from quasilpv.errors import look_up
 
 CONDITIONS: dict[str, Condition] = {
     entry.id: entry
@@ -53,6 +53,4 @@ def condition(name: str) -> Condition:
     Raises:
         InputError: there is none; the message lists those there are.
     """
-    if name not in CONDITIONS:
-        raise InputError("conditions", "condition", name, one_of(CONDITIONS, name))
-    return CONDITIONS[name]
+    return look_up(CONDITIONS, name, "conditions", "condition")

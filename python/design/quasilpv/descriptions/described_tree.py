@@ -8,8 +8,9 @@ from math import inf, isfinite
 
 import numpy as np
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InputError, one_of
-from quasilpv.systems.robots.spatial import FloatArray, Placement, SpatialInertia
+from quasilpv.systems.robots.spatial import Placement, SpatialInertia
 from quasilpv.systems.robots.tree import JointKind, KinematicTree, TreeJoint
 
 BASE = -1

@@ -12,15 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.chain import ChainForm, ChainJoint, prove_chain
 from quasilpv.certificate.exact_matrices import matrix, rational
 from quasilpv.descriptions.spatial_robot import SpatialRobot
 from quasilpv.synthesis.chain_storages import InertiaPairing, Side, find_storages
 from quasilpv.systems.robots.tree import KinematicTree
-
-FloatArray = npt.NDArray[np.float64]
 
 SAMPLES = 2000
 SEED = 20220315

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from quasilpv.arrays import FloatArray
 from quasilpv.descriptions.described_tree import BASE, DescribedJoint, DescribedTree
 from quasilpv.descriptions.safe_xml import check_includes, read_xml, root_of
 from quasilpv.errors import InputError
-from quasilpv.systems.robots.spatial import FloatArray, Placement, SpatialInertia
+from quasilpv.systems.robots.spatial import Placement, SpatialInertia
 from quasilpv.systems.robots.tree import JointKind
 
 

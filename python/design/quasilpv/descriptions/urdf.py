@@ -13,11 +13,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from quasilpv.arrays import FloatArray
 from quasilpv.descriptions.described_tree import BASE, DescribedJoint, DescribedTree
 from quasilpv.descriptions.library_output import captured_stderr
 from quasilpv.descriptions.safe_xml import read_xml, root_of
 from quasilpv.errors import InputError
-from quasilpv.systems.robots.spatial import FloatArray, Placement, SpatialInertia
+from quasilpv.systems.robots.spatial import Placement, SpatialInertia
 from quasilpv.systems.robots.tree import JointKind
 
 GRAVITY_M_S2 = 9.81

@@ -13,9 +13,9 @@ from quasilpv.artifact.store import JSON_NAME
 from quasilpv.documents.canonical import document_hash
 from quasilpv.errors import InputError
 from quasilpv.files import forget_input
+from quasilpv.progress import Progress, no_progress
 from quasilpv.release import checked_artifact, design_inputs
 from quasilpv.synthesis import DesignRequest, synthesise, without_compensation
-from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.tracking_design import TrackingDesign
 
 DEFAULT_CACHE = Path("out/cache")

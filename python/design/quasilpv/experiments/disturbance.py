@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact, evaluate
 from quasilpv.experiments.result import Disturbance
-from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.experiments.run import Run
 
 
 def true_disturbance(run: Run, artifact: Artifact, runtime: _runtime.Artifact) -> Disturbance | None:

@@ -19,13 +19,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.condition import Feedback, Options
 from quasilpv.conditions.theorems import i53
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.polytopes.representation import polytopic_model
 from quasilpv.systems.descriptor.system import DescriptorSystem
-
-FloatArray = npt.NDArray[np.float64]
 
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-9, 1e-11
 SINGULAR = 1e-12

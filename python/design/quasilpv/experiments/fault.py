@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from quasilpv.experiments.run import FloatArray
+from quasilpv.arrays import FloatArray
 from quasilpv.telemetry.codes import FAULT
 
 NUMBERS = {

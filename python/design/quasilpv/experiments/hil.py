@@ -16,12 +16,13 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact
 from quasilpv.defaults import WATCHDOG_S
 from quasilpv.errors import ClaimError, FaultStop, InputError, PlantError, QuasilpvError, TransportError
 from quasilpv.experiments.fault import Fault, fault_of
 from quasilpv.experiments.result import TrackResult
-from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.experiments.run import Run
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.experiments.track import RunFiles, run_documents, run_from_columns, summarise, write_run_files
 from quasilpv.telemetry import LOG_NAME

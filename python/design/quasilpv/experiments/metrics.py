@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.arrays import FloatArray
+from quasilpv.experiments.run import Run
 from quasilpv.telemetry.codes import AT_LIMIT
 
 

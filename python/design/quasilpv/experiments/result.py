@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact.envelope import OperatingEnvelope
 from quasilpv.defaults import ENCODER_BITS
 from quasilpv.experiments.metrics import Metrics
-from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.experiments.run import Run
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
+from quasilpv.arrays import FloatArray
+
 IntArray: TypeAlias = npt.NDArray[np.int64]
 
 

@@ -14,10 +14,10 @@ from enum import StrEnum
 import numpy as np
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import ClaimError
-from quasilpv.experiments.run import FloatArray
 from quasilpv.scenarios import Scenario
 from quasilpv.trajectories import Trajectory
 

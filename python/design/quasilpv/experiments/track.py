@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact, write_artifact
 from quasilpv.artifact.envelope import OperatingEnvelope
 from quasilpv.documents.canonical import canonical_json
@@ -17,7 +18,7 @@ from quasilpv.errors import InputError
 from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import TrackResult, Variant
-from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.experiments.run import Run
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.scenarios import (
     Sensors,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +19,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from PIL import Image
 
+from quasilpv.arrays import FloatArray
 from quasilpv.experiments.result import TrackResult
-from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.style import BLACK, BLUE, REFERENCE_COLOUR, VERMILION, WIDTH_IN, length_unit, style
 from quasilpv.files import write_atomically
+from quasilpv.progress import Progress, no_progress
 from quasilpv.systems.robots.mechanism import PlanarMechanism
 
 FRAMES_PER_SECOND = 20
@@ -42,7 +43,7 @@ def write_animation(
     results: Sequence[TrackResult],
     robot: PlanarMechanism,
     path: Path,
-    progress: Callable[[int, int], None] = lambda _done, _total: None,
+    progress: Progress = no_progress,
 ) -> int:
     """Write runs of one scenario side by side as a GIF that plays in real time.
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from quasilpv.experiments.run import FloatArray
+from quasilpv.arrays import FloatArray
 from quasilpv.figures.style import JOINT_COLOURS, legend_above, new_figure, style
 from quasilpv.figures.tracking import label_time
 

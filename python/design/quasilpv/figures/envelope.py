@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact.envelope import OperatingEnvelope
 from quasilpv.experiments.result import TrackResult
-from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, new_figure, style
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

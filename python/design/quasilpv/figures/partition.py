@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from quasilpv.arrays import FloatArray
 from quasilpv.experiments.result import TrackResult
-from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.style import BLUE, GREEN, ORANGE, REFERENCE_COLOUR, VERMILION, length_unit, new_figure, style
 
 _WINDOW_S = 0.02

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from quasilpv.experiments.run import FloatArray, Run
+from quasilpv.arrays import FloatArray
+from quasilpv.experiments.run import Run
 from quasilpv.figures.constraint import SMALLEST_DRAWN
 from quasilpv.figures.style import BLUE, JOINT_COLOURS, REFERENCE_COLOUR, legend_below, new_figure, style
 from quasilpv.figures.tracking import label_time, plot_joints

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from quasilpv.arrays import FloatArray
 from quasilpv.experiments.result import Disturbance, TrackResult
-from quasilpv.experiments.run import FloatArray
 from quasilpv.figures.style import (
     BLACK,
     BLUE,

@@ -8,9 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi.expressions import Expression, Triplets, Variable
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def unknown_offsets(variables: Sequence[Variable]) -> dict[Variable, int]:

@@ -26,11 +26,10 @@ import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from quasilpv.arrays import IndexArray
 from quasilpv.defaults import DEFAULT_MEMORY_GIB, DEFAULT_TIME_S
 from quasilpv.errors import InputError, QuasilpvError
 from quasilpv.lmi.layout import Layout
-
-IndexArray = npt.NDArray[np.intp]
 
 GIB = 2**30
 

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
+from quasilpv.arrays import FloatArray, IndexArray
 from quasilpv.lmi import budget
 from quasilpv.lmi.assembly import unknown_offsets, unpack
 from quasilpv.lmi.exact import is_positive_triangle, over_common_denominator
@@ -28,8 +29,6 @@ from quasilpv.lmi.independence import independent_columns
 from quasilpv.lmi.layout import Layout
 from quasilpv.lmi.problem import Problem
 
-FloatArray = npt.NDArray[np.float64]
-IndexArray = npt.NDArray[np.intp]
 ExactArray = npt.NDArray[Any]
 
 CANDIDATE_BITS = 40

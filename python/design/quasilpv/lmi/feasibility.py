@@ -14,16 +14,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 from scipy import sparse
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi import worker
 from quasilpv.lmi.assembly import triangle_places
 from quasilpv.lmi.compiled import CompiledProblem, rounded
 from quasilpv.lmi.expressions import Variable
 from quasilpv.lmi.problem import Outcome
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

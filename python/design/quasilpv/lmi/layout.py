@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray, IndexArray
 from quasilpv.lmi.expressions import Variable
 
-FloatArray = npt.NDArray[np.float64]
-IndexArray = npt.NDArray[np.intp]
 ExactArray = npt.NDArray[Any]
 
 

@@ -9,6 +9,7 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.arrays import symmetric
 from quasilpv.lmi import backends, budget
 from quasilpv.lmi.backends import BackendName
 from quasilpv.lmi.constraint import Constraint
@@ -164,7 +165,7 @@ class Problem:
             outcome = Outcome.INFEASIBLE_NUMERICALLY if raw.infeasible else Outcome.UNKNOWN
             return Solution(outcome, iterations=raw.iterations)
         margins = {
-            c.name: float(np.linalg.eigvalsh(_symmetric(c.expression.at(raw.values).astype(float)))[0])
+            c.name: float(np.linalg.eigvalsh(symmetric(c.expression.at(raw.values).astype(float)))[0])
             for c in self._constraints
         }
         holds = all(m > 0 for m in margins.values()) and self.holds_exactly(raw.values)
@@ -176,7 +177,3 @@ class Problem:
         """Whether every inequality holds strictly at the given point, with doubles taken as the rationals they are."""
         exact = {variable: to_rational(value) for variable, value in values.items()}
         return all(is_positive_definite(symmetric_part(c.expression.at_exactly(exact))) for c in self._constraints)
-
-
-def _symmetric(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    return (matrix + matrix.T) / 2

@@ -7,11 +7,9 @@ by then depends on its place alone, not on the parameters of a family: read off 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import IndexArray
 from quasilpv.lmi.compiled import CompiledProblem
-
-IndexArray = npt.NDArray[np.intp]
 
 
 def powers_between(own: CompiledProblem, other: CompiledProblem) -> IndexArray | None:

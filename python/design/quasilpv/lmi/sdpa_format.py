@@ -13,14 +13,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InputError
 from quasilpv.lmi.assembly import gradient, triangle_places, upper_triangle
 from quasilpv.lmi.expressions import Expression, ScalarProduct, Variable, zeros
 from quasilpv.lmi.problem import Problem
-
-FloatArray = npt.NDArray[np.float64]
 
 _COMMENT_MARKS = ('"', "*")
 _SEPARATORS = str.maketrans(dict.fromkeys(",(){}", " "))

@@ -22,12 +22,10 @@ from multiprocessing.connection import Connection
 
 import clarabel
 import numpy as np
-import numpy.typing as npt
 from scipy import sparse
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi import budget
-
-FloatArray = npt.NDArray[np.float64]
 
 IN_PLACE = 1_000_000
 """Entries of upper triangles times unknowns up to which a problem takes less than about a second."""

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from quasilpv.arrays import FloatArray
+
 _DOUBLINGS = 18
 _SERIES_TERMS = 10  # of the motion under a stiffness; enough while its fastest mode is slower than the sample rate
 

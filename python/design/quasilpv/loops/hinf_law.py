@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from quasilpv.loops.frozen_loop import FloatArray
+from quasilpv.arrays import FloatArray
 from quasilpv.loops.velocity_law import VelocityLaw
 
 

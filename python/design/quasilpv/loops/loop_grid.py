@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quasilpv.loops.frozen_loop import FloatArray, FrozenLaw, FrozenLoop
+from quasilpv.arrays import FloatArray
+from quasilpv.loops.frozen_loop import FrozenLaw, FrozenLoop
 
 CONFIGURATIONS = 64
 PAYLOAD_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)

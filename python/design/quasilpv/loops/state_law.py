@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quasilpv.loops.frozen_loop import FloatArray
+from quasilpv.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,12 +21,11 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from quasilpv.arrays import FloatArray
 from quasilpv.polytopes.units import Units
 from quasilpv.systems.descriptor.affine_system import SystemMatrices
 from quasilpv.systems.descriptor.premise import AffineMatrix
 from quasilpv.systems.descriptor.system import DescriptorSystem
-
-FloatArray = NDArray[np.float64]
 
 SMALL = 4.0
 """Binary orders below one from which on the robust penalty lets go of an entry."""

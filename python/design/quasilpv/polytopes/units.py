@@ -18,12 +18,10 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
+from quasilpv.arrays import FloatArray
 from quasilpv.systems.descriptor.premise import AffineMatrix, PremiseKind
 from quasilpv.systems.descriptor.system import DescriptorSystem
-
-FloatArray = NDArray[np.float64]
 
 LARGEST_EXPONENT = 200
 """Of a power of two; three of them are multiplied."""

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.documents.canonical import canonical_json
-from quasilpv.experiments.run import FloatArray
 from quasilpv.reproduction.closed_loops import Outcome
 from quasilpv.scenarios import build_scenario, tracking_experiment
 from quasilpv.systems.robots.fivebar import RhombicFiveBar

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from quasilpv.conditions.forms.mismatch import FloatArray
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InfeasibleError
 from quasilpv.figures.style import BLUE, GREEN, ORANGE, VERMILION, legend_below, new_figure, style
 from quasilpv.reproduction import rules

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from quasilpv.errors import InputError, one_of
+from quasilpv.errors import look_up
 from quasilpv.reproduction import (
     chapter_one,
     chapter_three,
@@ -53,6 +53,4 @@ def item(name: str) -> Item:
     Raises:
         InputError: there is none; the message lists those there are.
     """
-    if name not in ITEMS:
-        raise InputError("reproduction", "item", name, one_of(ITEMS, name))
-    return ITEMS[name]
+    return look_up(ITEMS, name, "reproduction", "item")

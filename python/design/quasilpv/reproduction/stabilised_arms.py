@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from quasilpv.experiments.run import FloatArray
+from quasilpv.arrays import FloatArray
 from quasilpv.figures.stabilisation import regulation_figure
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.closed_loops import EXACT, ClosedLoop, Outcome, outcome

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from quasilpv.errors import InputError, one_of
+from quasilpv.errors import look_up
 from quasilpv.scenarios.experiment import Planner, TrackingExperiment
 from quasilpv.scenarios.schema import sine_torques
 from quasilpv.synthesis.actuator_demand import Motion
@@ -70,9 +70,7 @@ def tracking_experiment(name: str) -> TrackingExperiment:
         InputError: there is none; the message lists those there are.
     """
     known = {experiment.name: experiment for experiment in tracking_experiments()}
-    if name not in known:
-        raise InputError("scenarios", "scenario", name, one_of(known, name))
-    return known[name]
+    return look_up(known, name, "scenarios", "scenario")
 
 
 def motions_of(source: Robot, sample_period_s: float = 0.02) -> tuple[Motion, ...]:

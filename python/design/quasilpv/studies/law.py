@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.condition import Feedback
 from quasilpv.conditions.gains import DelayedFeedback, DescriptorGain, Gain, MemorylessGain, ObserverGain
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.premise import AffineMatrix, Premise, PremiseKind
 from quasilpv.systems.descriptor.system import DescriptorSystem
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.condition import Options
 from quasilpv.lmi import budget
 from quasilpv.lmi.exact import Matrix, to_rational
@@ -29,7 +30,6 @@ from quasilpv.studies.frozen_modes import Disk, HalfPlane, Mode, Stable, elimina
 from quasilpv.systems.descriptor.premise import AffineMatrix, Premise
 from quasilpv.systems.descriptor.system import DescriptorSystem
 
-FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 MOST_POINTS = 48

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv.errors import InputError
+from quasilpv.progress import Progress
 from quasilpv.studies.answer import Answer, Verdict
 from quasilpv.studies.quadtree import Cell, Division, Node, divide
 from quasilpv.studies.question import Question
@@ -245,7 +246,7 @@ class Map:
         *,
         solver: Solver,
         memory: Memory,
-        progress: Callable[[int, int], None],
+        progress: Progress,
     ) -> None:
         """Check the axes; nothing is solved yet."""
         known = system_kind(question.system).parameters

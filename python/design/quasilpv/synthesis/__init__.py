@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from quasilpv.errors import InputError
-from quasilpv.synthesis.progress import Progress, no_progress
+from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.registry import CONTROLLERS, DEFAULT_CONTROLLER, ControllerKind, controller_kind
 from quasilpv.synthesis.request import DesignRequest, specification_for
 from quasilpv.synthesis.specification import Specification

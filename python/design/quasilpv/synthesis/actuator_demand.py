@@ -16,13 +16,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.loops.loop_grid import configurations
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 PAYLOAD_FRACTIONS = (0.0, 0.5, 1.0)
 POSTURES = 200

@@ -20,12 +20,11 @@ from typing import Literal, TypeAlias
 
 import clarabel
 import numpy as np
-import numpy.typing as npt
 from scipy import sparse
 
+from quasilpv.arrays import FloatArray
 from quasilpv.systems.robots.tree import KinematicTree
 
-FloatArray = npt.NDArray[np.float64]
 Side: TypeAlias = Literal["lowest", "highest"]
 
 ANGLES_PER_TURN = 16

@@ -19,22 +19,20 @@ from itertools import islice
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.tracking.iii10_reduced import TrackingPoint, UnknownTorques, reduced_tracking_condition
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.hinf_law import hinf_tracking_law
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.velocity_law import VelocityLaw
+from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.synthesis.plant_grid import PlantGrid
-from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
 from quasilpv.synthesis.torque.schedule import ScheduledPlants, full_schedule
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 DECAY = 0.4
 """Decay rate over the bandwidth."""

@@ -8,16 +8,14 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-import numpy.typing as npt
 import sympy as sp
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InfeasibleError
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.systems.descriptor.premise import AffineMatrix, Premise
 from quasilpv.systems.robots.arm_parameters import OperatingDomain
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

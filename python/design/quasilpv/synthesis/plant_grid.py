@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.loops.frozen_loop import FrozenLaw
 from quasilpv.loops.loop_grid import CONFIGURATIONS, PAYLOAD_FRACTIONS, LoopGrid, configurations
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 SCREEN_CONFIGURATIONS = 9
 SCREEN_PAYLOADS = (0.0, 1.0)

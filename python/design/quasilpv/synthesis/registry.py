@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from quasilpv.errors import InputError, one_of
-from quasilpv.synthesis.progress import Progress
+from quasilpv.errors import look_up
+from quasilpv.progress import Progress
 from quasilpv.synthesis.specification import Specification
 
 if TYPE_CHECKING:
@@ -108,6 +108,4 @@ def controller_kind(controller: str) -> ControllerKind:
     Raises:
         InputError: there is none; the message lists those there are.
     """
-    if controller not in CONTROLLERS:
-        raise InputError("controllers", "controller", controller, one_of(CONTROLLERS, controller))
-    return CONTROLLERS[controller]
+    return look_up(CONTROLLERS, controller, "controllers", "controller")

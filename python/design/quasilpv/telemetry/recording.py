@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.scenarios import Scenario
@@ -20,7 +21,6 @@ from quasilpv.telemetry.log import ARTIFACT, HEADER, SCENARIO, TRAJECTORY, RunHe
 from quasilpv.telemetry.message_types import Records, channel_type
 from quasilpv.trajectories import Trajectory
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Columns: TypeAlias = Mapping[str, FloatArray]
 """Quantities of a run by name, (N,) or (N, n), as the run-time side names them in its records."""
 

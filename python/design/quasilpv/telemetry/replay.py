@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.telemetry.codes import FAULT
 from quasilpv.telemetry.log import RunLog
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.figures.style import BLACK, JOINT_COLOURS
 from quasilpv.view.playback import Playback
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 MAX_POINTS = 400
 HISTOGRAM_BINS = 40

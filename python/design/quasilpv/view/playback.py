@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
@@ -20,7 +21,6 @@ from quasilpv.telemetry import RunLog
 from quasilpv.telemetry.codes import STATES, word
 from quasilpv.telemetry.message_types import Records
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 5.0)

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 import viser
 
+from quasilpv.arrays import FloatArray
 from quasilpv.figures.tracking import exaggeration
 from quasilpv.view.playback import Instant, Playback
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Colour: TypeAlias = tuple[int, int, int]
 
 LINK_COLOUR, PIN_COLOUR, BASE_COLOUR = (0, 114, 178), (64, 70, 80), (90, 96, 104)

@@ -24,7 +24,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from quasilpv.conditions.condition import FloatArray, Values
+from quasilpv.arrays import FloatArray
+from quasilpv.conditions.condition import Values
 from quasilpv.conditions.forms.extended import extended_input, extended_state
 from quasilpv.conditions.forms.slack import Slack
 from quasilpv.lmi import Expression, Problem, Variable, block, he, zeros

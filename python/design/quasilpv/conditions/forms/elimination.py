@@ -23,7 +23,7 @@ from collections.abc import Iterable
 import numpy as np
 import scipy.linalg
 
-from quasilpv.conditions.condition import FloatArray
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.forms.extended import extended_state
 from quasilpv.lmi import Expression, Problem
 from quasilpv.lmi.exact import null_space, to_rational

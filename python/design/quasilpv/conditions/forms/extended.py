@@ -15,14 +15,12 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi import Expression, block, zeros
 from quasilpv.lmi.expressions import Operand
 from quasilpv.polytopes import PolytopicModel
 from quasilpv.polytopes.model import ExactMatrix, Vertices
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def extended_state(E: ExactMatrix, A: ExactMatrix, differential: int, decay_rate: float = 0.0) -> ExactMatrix:

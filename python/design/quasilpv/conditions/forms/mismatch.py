@@ -21,12 +21,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi import to_rational
 from quasilpv.lmi.exact import Matrix
 
-FloatArray = npt.NDArray[np.float64]
 Real = float | Fraction
 
 

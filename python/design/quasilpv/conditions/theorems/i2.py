@@ -18,10 +18,10 @@ Every step is an equivalence. Larger slack families are not reduced: they prove 
 
 from __future__ import annotations
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
-    FloatArray,
     Form,
     Options,
     Statement,

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.condition import (
     Condition,
     Feedback,
-    FloatArray,
     Form,
     Options,
     Statement,

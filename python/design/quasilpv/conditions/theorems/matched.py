@@ -29,7 +29,8 @@ from fractions import Fraction
 import numpy as np
 import scipy.linalg
 
-from quasilpv.conditions.condition import Feedback, FloatArray, Options, Statement, Values, descriptor_law
+from quasilpv.arrays import FloatArray
+from quasilpv.conditions.condition import Feedback, Options, Statement, Values, descriptor_law
 from quasilpv.conditions.forms.elimination import gains_are_free, unactuated
 from quasilpv.lmi import Problem, Variable
 from quasilpv.polytopes import PolytopicModel

@@ -21,12 +21,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi import Problem, Variable, block, to_rational, zeros
 from quasilpv.lmi.exact import Matrix
-
-FloatArray = npt.NDArray[np.float64]
 
 DEGREE = 3
 """Of the inequality in the share of the delay."""

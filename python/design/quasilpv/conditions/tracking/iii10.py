@@ -19,11 +19,10 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.forms.blocks import block_diagonal, identity_blocks, single_sum
 from quasilpv.lmi import Expression, Problem, Solution, Variable, block, constant, he, zeros
 from quasilpv.lmi.exact import Matrix
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,12 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.forms.blocks import block_diagonal, identity_blocks, single_sum
 from quasilpv.lmi import Expression, Problem, Solution, Variable, block, constant, he, zeros
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

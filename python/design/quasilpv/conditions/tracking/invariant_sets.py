@@ -11,13 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 import scipy.optimize
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi import Expression, Problem, Variable, block, identity, zeros
-
-FloatArray = npt.NDArray[np.float64]
 
 SPARE = 1e-6
 """By how much a least set is widened, relative, so that exact arithmetic finds its inequality strict."""

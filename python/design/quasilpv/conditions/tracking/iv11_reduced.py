@@ -27,11 +27,11 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray, symmetric
 from quasilpv.conditions.forms.blocks import block_diagonal, double_sum, identity_blocks, single_sum
 from quasilpv.lmi import Expression, Problem, Solution, Variable, block, constant, he, to_rational, zeros
 from quasilpv.lmi.exact import Matrix
 
-FloatArray = npt.NDArray[np.float64]
 Real = float | Fraction
 
 
@@ -64,7 +64,7 @@ class FeedbackPoint:
             decay=self.decay * rate,
             disk=self.disk * rate,
             gamma=self.gamma / (rate**4 * inertia**2),
-            P=_symmetric(self.P * np.outer(state, state) * rate),
+            P=symmetric(self.P * np.outer(state, state) * rate),
             gains=self.gains * (inertia * rate**2) / state,
         )
 
@@ -178,7 +178,7 @@ class ObserverPoint:
             disk=self.disk * rate,
             noise=self.noise / (rate**4 * inertia),
             gamma=self.gamma / rate**4,
-            Q=_symmetric(self.Q * (torque**2 / rate) / np.outer(state, state)),
+            Q=symmetric(self.Q * (torque**2 / rate) / np.outer(state, state)),
             gains=self.gains * state[:, None] * rate,
             multipliers={name: F * torque / extended[:, None] for name, F in self.multipliers.items()},
         )
@@ -293,7 +293,3 @@ def observer_condition(
 
 def _first_column(entry: Callable[[int, int], Expression], i: int) -> Expression:
     return entry(i, 0)
-
-
-def _symmetric(matrix: FloatArray) -> FloatArray:
-    return (matrix + matrix.T) / 2.0

@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.forms.blocks import double_sum, single_sum
 from quasilpv.conditions.tracking.invariant_sets import trace_along
 from quasilpv.lmi import Expression, Problem, Variable, block, constant, he, identity, zeros
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def feedback_system(inertia: FloatArray, gains: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

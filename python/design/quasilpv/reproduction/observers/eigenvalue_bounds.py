@@ -27,11 +27,11 @@ import numpy as np
 import numpy.typing as npt
 from mpmath import libmp
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi import is_positive_definite
 from quasilpv.lmi.exact import Matrix
 from quasilpv.systems.intervals.functions import iv
 
-FloatArray = npt.NDArray[np.float64]
 Interval = tuple[float, float]
 
 SAMPLES_PER_AXIS = 25

@@ -14,11 +14,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.systems.robots.mechanism import PlanarMechanism
 
-FloatArray = npt.NDArray[np.float64]
 Motion = Callable[[float], tuple[FloatArray, FloatArray, FloatArray]]
 """From time to angles, speeds and accelerations."""
 

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.condition import Options, Statement
 from quasilpv.conditions.forms.mismatch import weighted_lipschitz
 from quasilpv.conditions.theorems.estimated_observer import statement
@@ -27,8 +27,6 @@ from quasilpv.polytopes import BlockPolytope, PolytopicModel
 from quasilpv.systems.descriptor.premise import AffineMatrix
 from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,9 +23,9 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 import sympy as sp
 
+from quasilpv.arrays import FloatArray
 from quasilpv.lmi import to_rational
 from quasilpv.lmi.exact import Matrix, symmetric_part
 from quasilpv.reproduction.observers.eigenvalue_bounds import (
@@ -37,8 +37,6 @@ from quasilpv.reproduction.observers.eigenvalue_bounds import (
 from quasilpv.systems.intervals.enclosure import enclose
 from quasilpv.systems.robots.arm_parameters import OperatingDomain
 from quasilpv.systems.robots.mechanism import PlanarMechanism
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,12 +18,12 @@ import numpy as np
 
 from quasilpv.conditions.tracking.sampled_chains import ChainGains, feedback_gains, observer_gains
 from quasilpv.errors import InfeasibleError
+from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.inertia_range import InertiaRange, largest_inertia_norm, needed_inertia_range
 from quasilpv.synthesis.acceleration.moving_inertia import InertiaDisc, needed_disc
 from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw, SampledLoop
 from quasilpv.synthesis.acceleration.tolerance import FrozenTolerance, MovingTolerance, Tolerance
 from quasilpv.synthesis.inertia_schedule import Schedule
-from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.systems.robots.registry import Robot
 

@@ -12,15 +12,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.tracking.invariant_sets import PeakSet, sampled_level_set, sampled_peak_set
 from quasilpv.conditions.tracking.sampled_errors import SampledErrors, sampled_errors
 from quasilpv.errors import InfeasibleError
 from quasilpv.lmi import Problem, Solution
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 REFERENCE_MARGIN = 0.15
 """Stated margin of the reference to the border of the operating domain, over the half width of each interval."""

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.loops.loop_grid import configurations
 from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 CONFIGURATIONS = 2000
 PAYLOAD_FRACTIONS = 9

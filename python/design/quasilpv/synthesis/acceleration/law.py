@@ -10,10 +10,10 @@ from dataclasses import replace
 from typing import Any
 
 from quasilpv.conditions.tracking.sampled_chains import ChainGains
+from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.design import AccelerationDesign, design_acceleration_law
 from quasilpv.synthesis.acceleration.envelope import acceleration_envelope
 from quasilpv.synthesis.acceleration.moving_lyapunov import MovingLyapunov, moving_lyapunov
-from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.robots.registry import Robot

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.tracking.inertia_disc import disc_problem
 from quasilpv.errors import InfeasibleError
 from quasilpv.lmi.compiled import CompiledProblem
@@ -21,8 +21,6 @@ from quasilpv.loops.loop_grid import configurations
 from quasilpv.synthesis.acceleration.inertia_range import design_inertia
 from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 POSTURES = 400
 PAYLOAD_FRACTIONS = 5

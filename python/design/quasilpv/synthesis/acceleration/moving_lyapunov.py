@@ -17,16 +17,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import LinAlgError, eigh, solve_discrete_are
 
+from quasilpv.arrays import FloatArray, symmetric
 from quasilpv.conditions.tracking.common_lyapunov import DelayedLoop, common_lyapunov_problem
 from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.lmi.feasibility import decide
 from quasilpv.synthesis.acceleration.moving_inertia import InertiaDisc
 from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw, LinearController
-
-FloatArray = npt.NDArray[np.float64]
 
 SIGNALS = 9
 THETA, SPEED, PREDICTED, DISTURBANCE, FILTERED, INTEGRAL, ON_ITS_WAY = 0, 1, slice(2, 6), 4, 6, 7, 8
@@ -86,7 +84,7 @@ def moving_lyapunov(law: AccelerationLaw, disc: InertiaDisc, longest_delay_sampl
         return None
     ends = [change.T @ decision.values[P] @ change for P in (condition.no_delay, condition.longest_delay)]
     unit = max(float(np.linalg.inv(P)[THETA, THETA]) for P in ends)
-    no_delay, longest_delay = (_symmetric(unit * P) for P in ends)
+    no_delay, longest_delay = (symmetric(unit * P) for P in ends)
     multiplier = unit * decision.values[condition.multiplier]
     rounded = common_lyapunov_problem(loop, disc.radius)
     found = {rounded.no_delay: no_delay, rounded.longest_delay: longest_delay, rounded.multiplier: multiplier}
@@ -94,7 +92,7 @@ def moving_lyapunov(law: AccelerationLaw, disc: InertiaDisc, longest_delay_sampl
         return None
     signals = SPARE * _common_bound([no_delay, longest_delay], known_signals(law))
     joints = SPARE * np.linalg.inv(disc.shape)
-    return MovingLyapunov(no_delay, longest_delay, float(multiplier[0, 0]), _symmetric(signals), _symmetric(joints))
+    return MovingLyapunov(no_delay, longest_delay, float(multiplier[0, 0]), symmetric(signals), symmetric(joints))
 
 
 def delayed_loop(law: AccelerationLaw, centre: float, longest_delay_samples: float) -> DelayedLoop:
@@ -144,7 +142,7 @@ def _start(loop: DelayedLoop, radius: float, units: FloatArray) -> FloatArray | 
         except LinAlgError:
             continue
         if float((b.T @ P @ b)[0, 0]) < 1.0 / radius**2:
-            return units @ _symmetric(P) @ units
+            return units @ symmetric(P) @ units
     return None
 
 
@@ -159,7 +157,3 @@ def _common_bound(lyapunov: Sequence[FloatArray], known: FloatArray) -> FloatArr
     first, second = (known @ np.linalg.solve(P, known.T) for P in lyapunov)
     values, vectors = eigh(first, second)
     return np.asarray(vectors @ np.diag(1.0 / np.maximum(values, 1.0)) @ vectors.T)
-
-
-def _symmetric(matrix: npt.NDArray[np.floating[Any]]) -> FloatArray:
-    return np.asarray((matrix + matrix.T) / 2, dtype=np.float64)

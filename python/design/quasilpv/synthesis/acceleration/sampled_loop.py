@@ -22,7 +22,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from quasilpv.arrays import FloatArray
+
 ComplexArray = npt.NDArray[np.complex128]
 
 FREQUENCY_POINTS = 300

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
-from quasilpv.synthesis.progress import Progress, no_progress
+from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.robots.registry import Robot

@@ -19,11 +19,12 @@ from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.velocity_law import VelocityLaw
+from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.baselines.printed import (
     Tuning,
     computed_torque_design,
@@ -32,12 +33,9 @@ from quasilpv.synthesis.baselines.printed import (
 )
 from quasilpv.synthesis.baselines.tuning_search import Axes, Candidate, TuningSearch
 from quasilpv.synthesis.plant_grid import PlantGrid
-from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def _geometric(low: float, high: float, count: int) -> tuple[float, ...]:

@@ -13,19 +13,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 import scipy.optimize
 
+from quasilpv.arrays import FloatArray
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.velocity_law import VelocityLaw
+from quasilpv.progress import Progress
 from quasilpv.synthesis.acceleration import design as acceleration_design
 from quasilpv.synthesis.baselines.printed import Tuning
 from quasilpv.synthesis.plant_grid import PlantGrid
-from quasilpv.synthesis.progress import Progress
 from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
 from quasilpv.systems.robots.registry import Robot
 
-FloatArray = npt.NDArray[np.float64]
 Axes = Mapping[str, tuple[float, ...]]
 """Values by name, in units of the sample rate (bandwidths), of the sample period (filter), of the nominal inertia."""
 

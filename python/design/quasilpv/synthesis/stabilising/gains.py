@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray, symmetric
 from quasilpv.conditions.choices import Form
 from quasilpv.conditions.condition import Options, Statement
 from quasilpv.conditions.theorems import i2, ii6
@@ -25,8 +25,6 @@ from quasilpv.conditions.theorems.ii8_direct import delayed_design
 from quasilpv.lmi import Problem, Solution, Variable, block
 from quasilpv.loops.state_law import descriptor_gain
 from quasilpv.polytopes import PolytopicModel
-
-FloatArray = npt.NDArray[np.float64]
 
 WINDOW_S = 0.05
 """Moving window of `delayed`."""
@@ -111,7 +109,7 @@ class _SingleSum:
         solution = least_gain(statement.problem, M, [P], rate)
         if solution is None:
             return None
-        return cls(statement, solution, _symmetric(solution.values[P]), np.stack([solution.values[Mj] for Mj in M]))
+        return cls(statement, solution, symmetric(solution.values[P]), np.stack([solution.values[Mj] for Mj in M]))
 
     def witness(self, *names: str) -> dict[str, Any]:
         """The values of these unknowns and of the slack matrices, JSON-able.
@@ -162,7 +160,7 @@ def solve_delayed(model: PolytopicModel, decay: float, rate: float) -> Candidate
     solution = least_gain(design.problem, F, [design.lyapunov.at(k) for k in vertices], rate)
     if solution is None:
         return None
-    P = np.stack([_symmetric(design.lyapunov.at(k).at(solution.values).astype(float)) for k in vertices])
+    P = np.stack([symmetric(design.lyapunov.at(k).at(solution.values).astype(float)) for k in vertices])
     numerators = np.stack([solution.values[Fj] for Fj in F])
     cube = numerators.reshape(*(len(P),) * 3, *numerators.shape[1:])
 
@@ -177,7 +175,3 @@ def solve_delayed(model: PolytopicModel, decay: float, rate: float) -> Candidate
         "descriptor": True,
     }
     return Candidate(law, {"window_s": WINDOW_S}, solution.objective, gain)
-
-
-def _symmetric(square: FloatArray) -> FloatArray:
-    return np.asarray((square + square.T) / 2.0)

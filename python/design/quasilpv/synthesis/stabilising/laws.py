@@ -17,13 +17,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.loop_grid import PAYLOAD_FRACTIONS, LoopGrid, configurations
 from quasilpv.loops.state_law import StateLaw
 from quasilpv.polytopes import BlockPolytope, PolytopicModel
-from quasilpv.synthesis.progress import Progress
+from quasilpv.progress import Progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.stabilising.gains import (
     WINDOW_S,
@@ -38,8 +38,6 @@ from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, pr
 from quasilpv.systems.descriptor.premise import AffineMatrix
 from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 DECAY_PER_S = 1.0
 """Decay rate of the state; V decreases twice as fast (Dehak 2022, fig. I.2)."""

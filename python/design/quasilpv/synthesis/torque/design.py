@@ -18,8 +18,8 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.tracking.iv11_reduced import (
     FeedbackPoint,
     ObserverPoint,
@@ -28,14 +28,12 @@ from quasilpv.conditions.tracking.iv11_reduced import (
 )
 from quasilpv.errors import InfeasibleError
 from quasilpv.lmi import to_rational
+from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.inertia_schedule import Schedule
 from quasilpv.synthesis.plant_grid import PlantGrid
-from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.torque.schedule import ScheduledLaw, ScheduledPlants, schedule
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 FEEDBACK_DECAY = 1.0 / 30.0
 """Decay rate of the tracking error over the radius of its pole disk."""

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.conditions.tracking.invariant_sets import line_search
 from quasilpv.conditions.tracking.polytopic_sets import (
     estimation_peak_set,
@@ -26,8 +26,6 @@ from quasilpv.synthesis.acceleration.envelope import (
     verified_solution,
 )
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 MULTIPLIERS = (0.02, 1.0)
 """Interval of the multipliers searched, over half the radius of the pole disk."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.inertia_schedule import premultiplied_schedule
-from quasilpv.synthesis.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.torque.design import TorqueDesign, design_torque_law
 from quasilpv.synthesis.torque.envelope import VertexTables, torque_envelope

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.frozen_loop import FrozenLaw
 from quasilpv.loops.loop_grid import LoopGrid
@@ -18,8 +18,6 @@ from quasilpv.polytopes import BlockPolytope
 from quasilpv.synthesis.inertia_schedule import Schedule, schedule_of
 from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.systems.robots.registry import Robot
-
-FloatArray = npt.NDArray[np.float64]
 
 LARGEST_SPREAD = 3.0
 """Premises are scheduled as long as eig(M_i^-1 M_j) stays below this over all pairs of vertices. One observer matrix Q

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
+from quasilpv.arrays import FloatArray
 from quasilpv.systems.descriptor.affine_terms import PremiseBasis
 from quasilpv.systems.descriptor.open_parameters import Made, OpenParameters, opened
 from quasilpv.systems.descriptor.premise import AffineMatrix
@@ -28,8 +28,6 @@ ENTRY_BITS = 44
 """Numbers of an entry are multiples of a unit so many bits below the largest: three steps further they are doubles."""
 _ROUNDING = 1e-6  # of numbers of a family beside those of a system made for a point: what `_LEAST_BITS` leaves
 _LEAST_BITS = 20  # of a number that is not 0, after that
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,9 +22,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from quasilpv.arrays import Matrix, Vector
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.arm_parameters import Link
-from quasilpv.systems.robots.dynamics import Matrix, Vector
 from quasilpv.systems.robots.mechanism import PlanarMechanism
 
 

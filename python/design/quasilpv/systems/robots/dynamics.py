@@ -20,13 +20,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from quasilpv.arrays import Matrix, Vector
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.premise import AffineMatrix
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class PlanarDynamics(ABC):

@@ -21,10 +21,10 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
+from quasilpv.arrays import Matrix, Vector
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.premise import AffineMatrix, Premise
 from quasilpv.systems.robots.arm_parameters import OperatingDomain
-from quasilpv.systems.robots.dynamics import Matrix, Vector
 from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
 from quasilpv.systems.robots.mechanism import PlanarMechanism
 

@@ -32,9 +32,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from quasilpv.arrays import Matrix, Vector
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.arm_parameters import Link
-from quasilpv.systems.robots.dynamics import Matrix, Vector
 
 BAUMGARTE_PER_S = 50.0
 """Rate at which simulated linkages are drawn back to h = 0."""

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from quasilpv.arrays import Matrix, Vector
 
 
 class ToolKinematics(ABC):

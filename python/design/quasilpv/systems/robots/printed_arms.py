@@ -9,9 +9,9 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
+from quasilpv.arrays import Matrix
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.arms import PlanarSerialArm
-from quasilpv.systems.robots.dynamics import Matrix
 from quasilpv.systems.robots.mechanism_symbols import SymbolicMechanism
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import pi
 
-from quasilpv.errors import InputError, one_of
+from quasilpv.errors import look_up
 from quasilpv.systems.robots.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
 from quasilpv.systems.robots.fivebar import RhombicFiveBar
 from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
@@ -58,9 +58,7 @@ def robot(name: str) -> Robot:
         InputError: there is none; the message lists those there are.
     """
     known = {entry.id: entry for entry in robots()}
-    if name not in known:
-        raise InputError("robots", "robot", name, one_of(known, name))
-    return known[name]
+    return look_up(known, name, "robots", "robot")
 
 
 def arm2() -> PrintedSerialArm:

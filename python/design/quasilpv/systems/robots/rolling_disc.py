@@ -19,9 +19,9 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
+from quasilpv.arrays import Matrix, Vector
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.arm_parameters import PayloadSet
-from quasilpv.systems.robots.dynamics import Matrix, Vector
 from quasilpv.systems.robots.mechanism import PlanarMechanism
 from quasilpv.systems.robots.mechanism_symbols import SymbolicMechanism
 

@@ -11,11 +11,10 @@ from functools import cached_property
 from math import isfinite
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InputError
-
-FloatArray = NDArray[np.float64]
 
 ROTATION_TOLERANCE = 1e-9
 """How far R R' may be from the identity: descriptions print angles with few digits, but not rotation matrices."""

@@ -23,12 +23,11 @@ from math import inf, isfinite, pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.spatial import Placement, SpatialInertia, cross_matrix
-
-FloatArray = NDArray[np.float64]
 
 
 class JointKind(StrEnum):

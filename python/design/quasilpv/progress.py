@@ -1,4 +1,4 @@
-"""How a long design says how far it is."""
+"""How long work says how far it is."""
 
 from __future__ import annotations
 
