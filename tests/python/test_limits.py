@@ -161,7 +161,7 @@ def test_when_actuators_are_too_slow_for_the_run_expect_the_share_in_its_row(
     trajectory = rest("hold", 3, 0.1)
     shifted = trajectory.coefficients.copy()
     shifted[:, :, 0] = short.trajectory.evaluate(0.0).angle
-    experiment = replace(short, trajectory=replace(trajectory, coefficients=shifted))
+    experiment = replace(short, reference=replace(trajectory, coefficients=shifted))
     shares = []
     for slew in (1e6, 5e3):
         artifact = to_artifact(limited(pid, slew_nm_per_s=(slew,) * 3))
