@@ -16,10 +16,9 @@ from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.affine_system import AffineSystem
 from quasilpv.systems.descriptor.affine_terms import PremiseBasis
 from quasilpv.systems.descriptor.equations import Equilibrium, equation_matrices
-from quasilpv.systems.descriptor.measured import with_kinds
 from quasilpv.systems.descriptor.names import Name
 from quasilpv.systems.descriptor.open_parameters import Made, open_parameters, opened
-from quasilpv.systems.descriptor.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.descriptor.premise import AffineMatrix, Premise, PremiseKind, with_kinds
 from quasilpv.systems.descriptor.premise_search import find_premises
 from quasilpv.systems.descriptor.rules import affine_in_memberships, membership_premises, read_constant
 from quasilpv.systems.descriptor.uncertainty import NormBoundedUncertainty
