@@ -11,11 +11,13 @@ lint() {
 }
 
 mapfile -t cpp_files < <(git ls-files '*.cpp' '*.hpp')
+mapfile -t pages < <(git ls-files '*.md' ':!docs/reference/benchmark-results.md') # generated
 mapfile -t shell_files < <(git grep --files-with-matches --max-count=1 '^#!/usr/bin/env bash' -- tools .ci)
 
 lint .venv/bin/ruff check .
 lint .venv/bin/ruff format --check .
 lint .venv/bin/mypy
+lint .venv/bin/python tools/lib/prose.py "${pages[@]}"
 lint .venv/bin/clang-format --dry-run -Werror "${cpp_files[@]}"
 lint shellcheck --external-sources --check-sourced --source-path=. "${shell_files[@]}"
 exit "$status"
