@@ -33,7 +33,7 @@ def test_when_a_page_is_broken_at_sentences_expect_the_same_page_once_and_for_al
 
 
 def test_when_a_paragraph_has_two_sentences_expect_two_lines_that_begin_nothing_else() -> None:
-    text = "See fig. I.2, e.g. this one. It has `a. b` and [a. B](x). " + "word " * 30 + "1. is no list.\n"
+    text = "See fig. I.2, e.g. this one. It has `a. b` and [a. B](x). Then " + "word " * 30 + "1. is no list.\n"
     lines = prose.reflowed(text).splitlines()
     assert lines[:2] == ["See fig. I.2, e.g. this one.", "It has `a. b` and [a. B](x)."]
     assert max(map(len, lines)) <= prose.LONGEST

@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 LONGEST = 120
@@ -78,54 +79,74 @@ def broken(text: str, first: str, indent: str) -> Iterator[str]:
         lead = indent
 
 
-def reflowed(page: str) -> str:
-    """A page with its prose broken at sentences."""
-    lines: list[str] = []
-    paragraph: list[str] = []
-    first = indent = ""
-    fence: str | None = None
+@dataclass
+class Block:
+    """Lines that belong together: a paragraph, or one line that stays as it is.
 
-    def finish() -> None:
-        if paragraph:
-            lines.extend(broken(" ".join(paragraph), first, indent))
-            paragraph.clear()
+    Attributes:
+        lines: as they are, the first one being line `number` of the page.
+        first, indent: what stands before the first line of a paragraph, and before the others.
+        words: of each line of a paragraph, without that; none of a line that stays.
+    """
 
-    for line in page.splitlines():
+    number: int
+    lines: list[str]
+    first: str = ""
+    indent: str = ""
+    words: list[str] = field(default_factory=list)
+
+    @property
+    def broken(self) -> list[str]:
+        """The lines as they should be."""
+        return list(broken(" ".join(self.words), self.first, self.indent)) if self.words else self.lines
+
+
+def blocks(page: str) -> Iterator[Block]:
+    """Of a page, in order."""
+    paragraph: Block | None = None
+    fence, item = "", False
+    for number, line in enumerate(page.splitlines(), 1):
         opening = FENCE.match(line)
-        if fence is not None or opening:
-            finish()
-            lines.append(line)
-            if fence is None and opening:
-                fence = opening[1]
-            elif opening and opening[1].startswith(fence or "") and line.strip() == opening[1]:
-                fence = None
-            continue
         bare = line.lstrip()
         depth = len(line) - len(bare)
         marker = MARKER.match(bare)
-        continues = bool(paragraph) and not marker and (depth == len(indent) or depth < 4)
-        is_code = depth >= 4 and not continues and not marker and (not lines or not indent)
-        if not bare or KEPT.match(line) or is_code or bare.startswith(">") or line.endswith(("  ", "\\")):
-            finish()
-            lines.append(line)
-            if bare and not line[0].isspace():
-                indent = ""
-        elif continues:
-            paragraph.append(bare.rstrip())
+        continues = paragraph is not None and not marker and (depth == len(paragraph.indent) or depth < 4)
+        is_code = depth >= 4 and not continues and not marker and not item
+        stays = not bare or bool(KEPT.match(line)) or is_code or bare.startswith(">") or line.endswith(("  ", "\\"))
+        if fence or opening or stays:
+            if paragraph is not None:
+                yield paragraph
+            paragraph = None
+            yield Block(number, [line])
+            if fence and opening and opening[1].startswith(fence) and bare == opening[1]:
+                fence = ""
+            elif opening and not fence:
+                fence = opening[1]
+            item = item and (not bare or depth > 0)
+        elif continues and paragraph is not None:
+            paragraph.lines.append(line)
+            paragraph.words.append(bare.rstrip())
         else:
-            finish()
-            first = " " * depth + (marker[0] if marker else "")
-            indent = " " * len(first)
-            paragraph.append(bare[len(marker[0]) if marker else 0 :].rstrip())
-    finish()
-    return "\n".join(lines) + "\n"
+            if paragraph is not None:
+                yield paragraph
+            lead = " " * depth + (marker[0] if marker else "")
+            text = bare[len(marker[0]) if marker else 0 :].rstrip()
+            paragraph = Block(number, [line], lead, " " * len(lead), [text])
+            item = bool(marker) or depth > 0
+    if paragraph is not None:
+        yield paragraph
+
+
+def reflowed(page: str) -> str:
+    """A page with its prose broken at sentences."""
+    return "".join(line + "\n" for block in blocks(page) for line in block.broken)
 
 
 def too_long(page: str) -> Iterator[int]:
-    """Numbers of lines that are longer than allowed and that `reflowed` would break."""
-    if page != reflowed(page):
-        kept = set(reflowed(page).splitlines())
-        for number, line in enumerate(page.splitlines(), 1):
+    """Numbers of lines of prose that are longer than allowed and that can be broken."""
+    for block in blocks(page):
+        kept = block.broken
+        for number, line in enumerate(block.lines, block.number):
             if len(line) > LONGEST and line not in kept:
                 yield number
 
