@@ -31,7 +31,9 @@ _DESIGN_ROOMS = (
     "synthesis",
     "certificate",
     "artifact",
+    "documents",
     "files",
+    "arrays.py",
     "defaults.py",
     "release.py",
 )
