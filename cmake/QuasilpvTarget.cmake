@@ -15,7 +15,7 @@ endfunction()
 # An executable of the project, linked with one of its libraries.
 function(quasilpv_executable name source library)
   add_executable(${name} ${source})
-  target_link_libraries(${name} PRIVATE ${library} CLI11::CLI11)
+  target_link_libraries(${name} PRIVATE ${library} quasilpv_command_line)
   quasilpv_target(${name})
   set_target_properties(${name} PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
   install(TARGETS ${name} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
@@ -24,16 +24,21 @@ function(quasilpv_executable name source library)
   endif()
 endfunction()
 
-# A library of the project, quasilpv::<name> here and for those who find_package(quasilpv); its public headers are the
-# folder include/ beside it.
-function(quasilpv_library target name)
+# A target of the project is quasilpv::<name> here and for those who find_package(quasilpv).
+function(quasilpv_export target name)
   add_library(quasilpv::${name} ALIAS ${target})
-  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  install(TARGETS ${target} EXPORT quasilpvTargets DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
+endfunction()
+
+# A library of the project; `headers` is the folder of its public ones, relative to the CMakeLists.txt.
+function(quasilpv_library target name headers)
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/${headers}>
                                               $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(${target} PUBLIC cxx_std_17)
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERSION ${PROJECT_VERSION}
+  set_target_properties(${target} PROPERTIES VERSION ${PROJECT_VERSION}
                                              SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
   quasilpv_target(${target})
-  install(TARGETS ${target} EXPORT quasilpvTargets DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
-  install(DIRECTORY include/quasilpv DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
+  quasilpv_export(${target} ${name})
+  install(DIRECTORY ${headers}/quasilpv DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
 endfunction()

@@ -7,9 +7,9 @@
 
 #include "drive_robot.hpp"
 #include "quasilpv/decimal.hpp"
+#include "quasilpv/exit_codes.hpp"
 #include "quasilpv/loop.hpp"
 #include "quasilpv/run_controller.hpp"
-#include "quasilpv/run_report.hpp"
 #include "quasilpv/telemetry_publisher.hpp"
 
 namespace {

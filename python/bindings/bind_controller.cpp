@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <utility>
-#include <variant>
 
 #include "bindings.hpp"
 #include "quasilpv/artifact.hpp"
@@ -14,10 +13,6 @@
 
 namespace quasilpv::bindings {
 namespace {
-
-const DesignModel& model_of(const Artifact& artifact) {
-  return std::visit([](const auto& law) -> const DesignModel& { return law.model; }, artifact.law());
-}
 
 py::array_t<double> evaluate_angles(const Program& program, const Artifact& artifact, const DoubleArray& angle) {
   const JointArray angles = to_joint_array(angle, artifact.joints(), "angle");
@@ -36,14 +31,12 @@ py::array_t<double> evaluate_coriolis(const Artifact& artifact, const DoubleArra
   const JointArray speeds = to_joint_array(speed, n, "speed");
   const JointArray reference_speeds = to_joint_array(reference_speed, n, "reference_speed");
   const ProgramInput input{angles.data(), speeds.data(), reference_speeds.data()};
-  JointArray torque{};
-  if (const auto* pid = std::get_if<PidParameters>(&artifact.law())) {
-    pid->coriolis_reference.evaluate(input, torque.data());
-  } else if (const auto* computed_torque = std::get_if<ComputedTorqueParameters>(&artifact.law())) {
-    computed_torque->coriolis.evaluate(input, torque.data());
-  } else {
+  const Program* const coriolis = artifact.law().coriolis();
+  if (coriolis == nullptr) {
     throw InputError("artifact", "law.kind", artifact.law_kind(), "a law with a Coriolis program");
   }
+  JointArray torque{};
+  coriolis->evaluate(input, torque.data());
   return to_numpy(torque, n);
 }
 
@@ -71,7 +64,7 @@ py::array_t<double> inertia_dispatch(const BlockPolytope& inertia, int joints, d
 
 /// M_n(z), z clamped to its box.
 py::array_t<double> evaluate_inertia(const Artifact& artifact, const DoubleArray& premise) {
-  const BlockPolytope& inertia = model_of(artifact).inertia;
+  const BlockPolytope& inertia = artifact.law().model.inertia;
   if (premise.ndim() != 1 || premise.shape(0) != inertia.premises()) {
     throw InputError("argument", "premise", "shape " + std::string(py::str(premise.attr("shape"))),
                      "shape (" + std::to_string(inertia.premises()) + ",)");
@@ -119,17 +112,17 @@ void bind_artifact(py::module_& module) {
       .def(
           "premises",
           [](const Artifact& artifact, const DoubleArray& angle) {
-            return evaluate_angles(model_of(artifact).premises, artifact, angle);
+            return evaluate_angles(artifact.law().model.premises, artifact, angle);
           },
           py::arg("angle"), "z(y), not clamped, shape (premises,).")
       .def(
           "gravity",
           [](const Artifact& artifact, const DoubleArray& angle) {
-            return evaluate_angles(model_of(artifact).gravity, artifact, angle);
+            return evaluate_angles(artifact.law().model.gravity, artifact, angle);
           },
           py::arg("angle"), "G(y), N m, shape (joints,).")
       .def("coriolis", &evaluate_coriolis, py::arg("angle"), py::arg("speed"), py::arg("reference_speed"),
-           "N(y, w) r' of a PID law, N(y, w) w of a computed-torque law, N m, shape (joints,).")
+           "The Coriolis torque that the law feeds forward, N(y, w) r' or N(y, w) w, N m, shape (joints,).")
       .def("inertia", &evaluate_inertia, py::arg("premise"), "M_n(z), kg m^2, shape (joints, joints); z is clamped.");
 }
 

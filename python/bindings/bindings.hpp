@@ -4,9 +4,10 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <nlohmann/json.hpp>
 #include <string>
 
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
 #include "quasilpv/step.hpp"
 
 namespace quasilpv::bindings {

@@ -4,10 +4,11 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
 #include "quasilpv/step.hpp"
 
 namespace quasilpv::testing {

@@ -43,11 +43,9 @@ TEST(Artifact, keeps_what_the_document_says) {
   EXPECT_EQ(artifact.limits().torque_nm[2], 1500.0);
   EXPECT_EQ(artifact.limits().torque_nm[3], 0.0);
   EXPECT_EQ(artifact.domain().angle_rad[1].low, -2.0);
-  const auto& law = std::get<DobAccelerationParameters>(artifact.law());
-  EXPECT_EQ(law.kp, -4800.0);
-  EXPECT_EQ(law.observer[3], 1.6e7);
-  EXPECT_TRUE(law.disturbance_compensation);
-  EXPECT_TRUE(law.model.inertia.is_affine());
+  EXPECT_FALSE(artifact.law().reads_speed());
+  EXPECT_EQ(artifact.law().coriolis(), nullptr);
+  EXPECT_TRUE(artifact.law().model.inertia.is_affine());
 }
 
 TEST(Artifact, has_as_hash_prefix_the_first_eight_bytes_big_endian) {
@@ -159,12 +157,13 @@ TEST(Artifact, refuses_a_premultiplication_that_is_null_or_scheduled_otherwise) 
 
 TEST(Artifact, keeps_a_lyapunov_bound_of_either_twin_padded_to_the_most_joints) {
   Json table = artifact_table("dob-acceleration", 2);
-  EXPECT_FALSE(std::get<DobAccelerationParameters>(parse(table).law()).lyapunov_bound);
+  EXPECT_EQ(parse(table).law().lyapunov_bound(), nullptr);
   table["law"]["lyapunov_bound"] = testing::TestArm{2}.lyapunov_bound();
   for (const std::string& bytes : {json_twin(table), cbor_twin(table)}) {
     const Artifact artifact = Artifact::parse(bytes, "a");
-    const auto& bound = std::get<DobAccelerationParameters>(artifact.law()).lyapunov_bound;
-    ASSERT_TRUE(bound);
+    const LyapunovBound* const bound = artifact.law().lyapunov_bound();
+    ASSERT_NE(bound, nullptr);
+    EXPECT_EQ(bound->innovation_share, 1.0 - table["law"]["observer"][0].get<double>());
     EXPECT_EQ(bound->signals, testing::TestArm::weights(LyapunovBound::kSignals));
     EXPECT_EQ(bound->joints.topLeftCorner(2, 2), testing::TestArm::weights(2));
     EXPECT_TRUE((bound->joints.bottomRows(kMaxJoints - 2).isZero(0.0)));

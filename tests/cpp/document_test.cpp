@@ -1,4 +1,4 @@
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -88,7 +88,7 @@ TEST(Faults, F9_when_outside_the_premise_box_expect_clamped_premises_then_degrad
   for (std::int64_t seq = 0; seq <= 1200; ++seq) {
     const double angle = std::min(1.95 + 2e-3 * static_cast<double>(seq), 2.2);
     loop.handle(reading(seq, {angle, -0.2, 0.4}), at(seq));
-    telemetry_v1 sample;
+    TelemetrySample sample;
     ASSERT_TRUE(ring->pop(sample));
     ASSERT_EQ((loop.command().flags & kPremiseOutsideBox) != 0, std::cos(angle) < -0.5);
     left = left < 0 && std::cos(angle) < -0.5 ? seq : left;

@@ -59,7 +59,7 @@ TEST_F(HardwareDriver, is_paced_on_the_grid_and_gets_one_command_per_reading) {
   EXPECT_EQ(report.end, ControllerRunEnd::kPlantEnded);
   EXPECT_EQ(report.commands + robot.skipped_ticks(), loop_.last_seq() + 1);
   EXPECT_LE(loop_.predicted_steps(), robot.skipped_ticks());
-  telemetry_v1 sample;
+  TelemetrySample sample;
   while (ring_->pop(sample)) {
     for (std::size_t j = 0; j < kJoints; ++j) {
       ASSERT_TRUE(std::isfinite(sample.applied_torque_nm[j]));

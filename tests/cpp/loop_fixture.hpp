@@ -53,7 +53,7 @@ inline Scenario scenario(std::int64_t samples) {
   Scenario scenario;
   scenario.name = "test";
   scenario.duration_s = static_cast<double>(samples) * kSamplePeriod;
-  scenario.plant = three_link_arm(0.5);
+  scenario.plant = [] { return std::make_unique<SerialArm>(three_link_arm(0.5)); };
   scenario.external_torque = {{1, 20.0, 15.0, 0.3}};
   scenario.sensors = {20, 0.05, 7};
   scenario.transport_delay_s = 0.3 * kSamplePeriod;

@@ -146,8 +146,8 @@ TEST_F(LatchedFault, keeps_the_50_samples_before_it_and_itself_as_the_last_one) 
   for (std::size_t i = 0; i < samples.size(); ++i) {
     EXPECT_EQ(samples[i].seq, 30 + static_cast<std::int64_t>(i));
   }
-  EXPECT_EQ(samples[48].state, static_cast<std::int32_t>(ControllerState::kDegraded));
-  EXPECT_EQ(samples[49].state, static_cast<std::int32_t>(ControllerState::kFault));
+  EXPECT_EQ(samples[48].state, ControllerState::kDegraded);
+  EXPECT_EQ(samples[49].state, ControllerState::kFault);
 }
 
 TEST_F(LatchedFault, shows_no_torque_in_telemetry_but_the_safe_one) {
@@ -155,7 +155,7 @@ TEST_F(LatchedFault, shows_no_torque_in_telemetry_but_the_safe_one) {
   loop_.publish_to(ring.get());
   for (std::int64_t seq = 80; seq < 180; ++seq) {  // an arm that falls: the law would answer with all it has
     loop_.handle(reading(seq, {kStart[0] + 0.1 * static_cast<double>(seq - 80), kStart[1], kStart[2]}), at(seq));
-    telemetry_v1 sample;
+    TelemetrySample sample;
     ASSERT_TRUE(ring->pop(sample));
     for (std::size_t j = 0; j < kJoints; ++j) {
       ASSERT_EQ(sample.commanded_torque_nm[j], torque_of(loop_)[j]);
@@ -200,11 +200,11 @@ TEST(ControlLoop, when_samples_are_missing_expect_a_telemetry_sample_for_each_pr
   loop.publish_to(ring.get());
   loop.handle(reading(0), at(0));
   loop.handle(reading(4), at(4));
-  telemetry_v1 sample;
+  TelemetrySample sample;
   for (std::int64_t seq = 0; seq <= 4; ++seq) {
     ASSERT_TRUE(ring->pop(sample));
     EXPECT_EQ(sample.seq, seq);
-    EXPECT_EQ((sample.flags & static_cast<std::int32_t>(kMeasurementInvalid)) != 0, seq % 4 != 0);
+    EXPECT_EQ((sample.flags & kMeasurementInvalid) != 0, seq % 4 != 0);
   }
   EXPECT_FALSE(ring->pop(sample));
 }

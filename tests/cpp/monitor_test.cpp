@@ -122,7 +122,7 @@ TEST(Monitor, is_in_the_telemetry_of_every_sample_and_falls_back_to_the_predicti
   broken.angle_rad[0] = NAN;
   loop.handle(reading(0, outside), at(0));
   loop.handle(broken, at(1));
-  telemetry_v1 sample;
+  TelemetrySample sample;
   ASSERT_TRUE(ring->pop(sample));
   EXPECT_NEAR(sample.premise_excess, 0.3 / kWidth, 1e-12);
   EXPECT_NEAR(sample.membership_sum, 1.0, 1e-14);

@@ -1,5 +1,5 @@
 // The moving window against sums written out, and against integrals in closed form.
-#include "../../cpp/controller/src/laws/moving_window.hpp"
+#include "laws/common/moving_window.hpp"
 
 #include <gtest/gtest.h>
 

@@ -63,7 +63,7 @@ TEST_P(EveryLaw, gives_over_a_link_in_lock_step_the_samples_of_the_in_process_ru
   EXPECT_EQ(loop.steps(), kSamples);
   expect_plant_record(record, in_process.samples);
 
-  telemetry_v1 sample;
+  TelemetrySample sample;
   std::size_t k = 0;
   for (; ring->pop(sample); ++k) {
     for (std::size_t j = 0; j < kJoints; ++j) {
@@ -289,7 +289,7 @@ TEST(PlantLoop, F22_when_a_second_controller_answers_in_lock_step_expect_the_run
 TEST(PlantLoop, brakes_each_joint_with_the_time_constant_asked_for) {
   // A point mass m at distance l: inertia m l^2, so b = m l^2 / tau.
   Scenario pendulum = scenario(10);
-  pendulum.plant = point_pendulum(0.7);
+  pendulum.plant = [] { return std::make_unique<SerialArm>(point_pendulum(0.7)); };
   pendulum.external_torque.clear();
   EXPECT_NEAR(viscous_brake(pendulum, 0.05)[0], 0.49 / 0.05, 1e-9);
 }

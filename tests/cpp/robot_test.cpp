@@ -35,7 +35,7 @@ TEST(PlantRobot, gives_under_run_controller_the_samples_of_the_in_process_run_bi
   EXPECT_EQ(robot.failure(), "");
   const std::vector<double>& torque = in_process.samples["torque_applied_nm"].values;
   ASSERT_EQ(torque.size(), static_cast<std::size_t>(kSamples * law.joints()));
-  telemetry_v1 sample;
+  TelemetrySample sample;
   for (std::size_t i = 0; i < torque.size(); i += 3) {
     ASSERT_TRUE(ring->pop(sample));
     for (std::size_t j = 0; j < 3; ++j) {

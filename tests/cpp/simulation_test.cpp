@@ -26,7 +26,7 @@ Scenario free_rotor(double duration_s = 0.01) {
   Scenario scenario;
   scenario.name = "free rotor";
   scenario.duration_s = duration_s;
-  scenario.plant = testing::point_pendulum(1.0, 0.0);
+  scenario.plant = [] { return std::make_unique<SerialArm>(testing::point_pendulum(1.0, 0.0)); };
   scenario.integrator = Rk4Options{};
   return scenario;
 }
@@ -36,7 +36,7 @@ Scenario tracking_arm() {
   Scenario scenario;
   scenario.name = "tracking arm";
   scenario.duration_s = 1.0;
-  scenario.plant = testing::three_link_arm(1.0);
+  scenario.plant = [] { return std::make_unique<SerialArm>(testing::three_link_arm(1.0)); };
   scenario.external_torque = {{0, 450.0, 15.0, 0.0}, {1, 375.0, 15.0, 0.0}, {2, 300.0, 15.0, 0.0}};
   scenario.initial_angle = {0.2, 1.2, -0.7};
   return scenario;

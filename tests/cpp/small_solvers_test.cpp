@@ -1,5 +1,5 @@
 // The small direct solvers against Eigen's decompositions, and on matrices they must refuse.
-#include "../../cpp/controller/src/laws/small_solvers.hpp"
+#include "laws/common/small_solvers.hpp"
 
 #include <gtest/gtest.h>
 

@@ -21,8 +21,8 @@ namespace {
 
 constexpr double kPeriod = 1e-3;
 
-telemetry_v1 sample(std::int64_t seq, double angle = 0.0) {
-  telemetry_v1 telemetry{};
+TelemetrySample sample(std::int64_t seq, double angle = 0.0) {
+  TelemetrySample telemetry;
   telemetry.seq = seq;
   telemetry.measured_angle_rad[1] = angle;
   return telemetry;

@@ -4,11 +4,12 @@
 // hash put right, which lets it through to the reading of the law. Anything but acceptance or InputError is a finding.
 #include <cstdint>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
+#include "document/document.hpp"
 #include "quasilpv/artifact.hpp"
-#include "quasilpv/document.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace {

@@ -3,6 +3,7 @@
 import ast
 import re
 import subprocess
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -218,6 +219,44 @@ def test_the_controller_never_includes_the_simulator() -> None:
     files = tracked_files("cpp/controller/*.hpp", "cpp/controller/*.cpp")
     assert files
     assert [(file, name) for file in files for name in included_headers(file) if name in simulator] == []
+
+
+CORE = ("include/core", "src/document", "src/artifact", "src/laws", "src/loop", "src/process")
+"""Folders of quasilpv::core in cpp/controller."""
+
+
+def test_the_core_of_the_controller_knows_no_transport() -> None:
+    link = {header.name for header in tracked_files("cpp/controller/include/link/*.hpp", "lcmtypes/*.lcm")}
+    link |= {f"{path.stem}.hpp" for path in tracked_files("lcmtypes/*.lcm")}
+    files = tracked_files(*(f"cpp/controller/{folder}/*.[ch]pp" for folder in CORE))
+    assert len(files) > 50
+    assert len(link) > 10
+    users = [
+        (file, name)
+        for file in files
+        for name in included_headers(file)
+        if name.startswith(("lcm/", "sodium")) or name.rpartition("/")[2] in link
+    ]
+    assert users == []
+
+
+def test_no_public_header_includes_json() -> None:
+    headers = tracked_files("cpp/*/include/*.hpp")
+    assert len(headers) > 50
+    users = [
+        (file, name)
+        for file in headers
+        for name in included_headers(file)
+        if "json" in name or name.startswith("document/")
+    ]
+    assert users == []
+
+
+def test_no_folder_of_sources_has_more_than_twenty_files() -> None:
+    files = tracked_files("cpp/*/src/*.[ch]pp")
+    assert len(files) > 70
+    count = Counter(file.parent for file in files)
+    assert {folder: number for folder, number in count.items() if number > 20} == {}
 
 
 def test_only_the_sources_of_the_ida_integrator_include_sundials() -> None:

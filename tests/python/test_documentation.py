@@ -269,7 +269,7 @@ def test_the_architecture_names_every_room_of_the_package() -> None:
 
 
 def test_every_public_header_says_in_its_first_line_what_it_is_for() -> None:
-    headers = [*ROOT.glob("cpp/*/include/quasilpv/*.hpp")]
+    headers = [*ROOT.glob("cpp/*/include/**/*.hpp")]
     assert headers
     assert [path.name for path in headers if not re.match(r"// \S", path.read_text(encoding="utf-8"))] == []
 

@@ -28,7 +28,7 @@ Reference swing(const JointArray& centre, double time_s) {
   return reference;
 }
 
-Json measure(const std::vector<std::string>& arguments) {
+nlohmann::json measure(const std::vector<std::string>& arguments) {
   const Scenario scenario = Scenario::load(arguments[0]);
   std::vector<JointArray> torques;
   run_closed_loop(

@@ -16,7 +16,8 @@ using namespace quasilpv;         // NOLINT(google-build-using-namespace): this 
 using namespace quasilpv::bench;  // NOLINT(google-build-using-namespace)
 
 nlohmann::json measure(const std::vector<std::string>& arguments) {
-  const SerialArm arm(std::get<SerialArmParameters>(Scenario::load(arguments[0]).plant));
+  const auto plant = Scenario::load(arguments[0]).make_plant();
+  const auto& arm = dynamic_cast<const SerialArm&>(*plant);
   const std::vector<ArmState> states = read_states(arguments[1]);
   const auto torque = [&](const ArmState& state) {
     return arm.inverse_dynamics(state.angle, state.speed, state.acceleration);

@@ -11,7 +11,7 @@ namespace {
 using namespace quasilpv;         // NOLINT(google-build-using-namespace): this file is the program
 using namespace quasilpv::bench;  // NOLINT(google-build-using-namespace)
 
-Json measure(const std::vector<std::string>& arguments) {
+nlohmann::json measure(const std::vector<std::string>& arguments) {
   const Artifact artifact = Artifact::load(arguments[0]);
   const Scenario scenario = Scenario::load(arguments[2]);
   const Recording recording = record(artifact, Trajectory::load(arguments[1]), scenario);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "document/document.hpp"
 #include "main.hpp"
 #include "quasilpv/artifact.hpp"
 #include "quasilpv/controller.hpp"
@@ -152,8 +153,8 @@ Json measure(const std::vector<std::string>& arguments) {
       throw std::runtime_error("the law that is timed left the numbers at sample " + std::to_string(input.seq));
     }
   }
-  const auto& law = std::get<DobTorqueParameters>(artifact.law());
-  return {{"premises", premises}, {"vertices", law.feedback.vertices()}, {"timing", to_json(timing)}};
+  const int vertices = artifact.law().model.inertia.vertices();  // the gains have as many
+  return {{"premises", premises}, {"vertices", vertices}, {"timing", to_json(timing)}};
 }
 
 }  // namespace

@@ -6,15 +6,15 @@
 #include <memory>
 #include <string>
 
+#include "command_line/command_line.hpp"
+#include "command_line/run_report.hpp"
 #include "quasilpv/artifact.hpp"
-#include "quasilpv/command_line.hpp"
 #include "quasilpv/doctor.hpp"
 #include "quasilpv/lcm_link.hpp"
 #include "quasilpv/link_robot.hpp"
 #include "quasilpv/loop.hpp"
 #include "quasilpv/reset_fault.hpp"
 #include "quasilpv/run_controller.hpp"
-#include "quasilpv/run_report.hpp"
 #include "quasilpv/telemetry_publisher.hpp"
 #include "quasilpv/trajectory.hpp"
 

@@ -4,12 +4,12 @@
 #include <memory>
 #include <string>
 
+#include "command_line/command_line.hpp"
+#include "command_line/run_report.hpp"
 #include "quasilpv/artifact.hpp"
-#include "quasilpv/command_line.hpp"
 #include "quasilpv/csv_writer.hpp"
 #include "quasilpv/lcm_link.hpp"
 #include "quasilpv/plant_loop.hpp"
-#include "quasilpv/run_report.hpp"
 #include "quasilpv/scenario.hpp"
 
 namespace {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
+#include "document/document.hpp"
 #include "quasilpv/step.hpp"
 
 namespace quasilpv {

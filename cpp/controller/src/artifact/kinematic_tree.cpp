@@ -4,7 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "tree_sweep.hpp"
+#include "artifact/tree_sweep.hpp"
+#include "document/field.hpp"
 
 namespace quasilpv {
 namespace {

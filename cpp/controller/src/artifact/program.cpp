@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "document/field.hpp"
+
 namespace quasilpv {
 namespace {
 

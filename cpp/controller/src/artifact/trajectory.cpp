@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
 
 namespace quasilpv {
 namespace {

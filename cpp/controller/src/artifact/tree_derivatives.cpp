@@ -5,8 +5,8 @@
 #include <unsupported/Eigen/AutoDiff>
 // clang-format on
 
+#include "artifact/tree_sweep.hpp"
 #include "quasilpv/kinematic_tree.hpp"
-#include "tree_sweep.hpp"
 
 namespace quasilpv {
 

@@ -5,11 +5,12 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "document_limits.hpp"
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
+#include "document/document_limits.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {

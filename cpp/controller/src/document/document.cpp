@@ -1,11 +1,12 @@
 // Strict reading of documents: one SAX reader for both twins, then the comparison with the canonical bytes.
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
-#include "document_limits.hpp"
+#include "document/document_limits.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {

@@ -1,8 +1,11 @@
 // The cursor of strict loading: every refusal names the source, the path of the field, what was found and expected.
+#include "document/field.hpp"
+
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {
@@ -31,6 +34,15 @@ void Field::fail(const std::string& got, const std::string& expected) const {
   throw InputError(source_, path_.empty() ? "document" : path_, got, expected);
 }
 
+void Field::fail_choice(const std::vector<std::string>& names) const {
+  std::string choice;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const char* const joint = i == 0 ? "" : i + 1 == names.size() ? " or " : ", ";
+    choice.append(joint).append("\"" + names[i] + "\"");
+  }
+  fail(shown(*value_), choice);
+}
+
 Field Field::operator[](const std::string& key) const {
   const std::string path = path_.empty() ? key : path_ + "." + key;
   if (!value_->is_object()) {
@@ -50,17 +62,15 @@ Field Field::at(std::size_t index) const {
   return {(*value_)[index], source_, path_ + "[" + std::to_string(index) + "]"};
 }
 
-void Field::only(std::initializer_list<const char*> allowed) const {
+void Field::only(const std::vector<std::string>& allowed) const {
   if (!value_->is_object()) {
     fail(shown(*value_), "an object");
   }
   for (const auto& [key, member] : value_->items()) {
-    const bool known =
-        std::any_of(allowed.begin(), allowed.end(), [&found = key](const char* name) { return found == name; });
-    if (!known) {
+    if (std::find(allowed.begin(), allowed.end(), key) == allowed.end()) {
       std::string names;
-      for (const char* name : allowed) {
-        names += (names.empty() ? "" : ", ") + std::string(name);
+      for (const std::string& name : allowed) {
+        names += (names.empty() ? "" : ", ") + name;
       }
       fail("the unknown member " + shown(Json(key)), "only " + names);
     }

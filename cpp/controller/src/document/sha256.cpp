@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
 
 namespace quasilpv {
 namespace {

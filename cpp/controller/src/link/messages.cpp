@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <random>
 #include <type_traits>
 
@@ -40,6 +42,11 @@ bool joints_agree(const Message& message, const WireIdentity& identity) noexcept
   } else {
     return message.joints == identity.joints;
   }
+}
+
+template <std::size_t Size>
+void copy(const std::array<double, Size>& source, double (&target)[Size]) noexcept {
+  std::copy(source.begin(), source.end(), target);
 }
 
 constexpr bool is_within(std::int64_t value, std::int64_t low, std::int64_t high) noexcept {
@@ -121,6 +128,34 @@ DecodeStatus decode(const void* bytes, std::size_t size, const WireIdentity& ide
     return DecodeStatus::kWrongArtifact;
   }
   return DecodeStatus::kAccepted;
+}
+
+telemetry_v1 to_message(const TelemetrySample& sample) noexcept {
+  telemetry_v1 message{};
+  message.seq = sample.seq;
+  message.premises = sample.premises;
+  message.state = static_cast<std::int32_t>(sample.state);
+  message.flags = static_cast<std::int32_t>(sample.flags);
+  message.realtime = sample.realtime ? 1 : 0;
+  message.drops = sample.drops;
+  message.step_ns = sample.step_ns;
+  copy(sample.reference_angle_rad, message.reference_angle_rad);
+  copy(sample.reference_speed_rad_s, message.reference_speed_rad_s);
+  copy(sample.reference_acceleration_rad_s2, message.reference_acceleration_rad_s2);
+  copy(sample.measured_angle_rad, message.measured_angle_rad);
+  copy(sample.measured_speed_rad_s, message.measured_speed_rad_s);
+  copy(sample.estimated_angle_rad, message.estimated_angle_rad);
+  copy(sample.estimated_speed_rad_s, message.estimated_speed_rad_s);
+  copy(sample.estimated_disturbance, message.estimated_disturbance);
+  copy(sample.filtered_disturbance, message.filtered_disturbance);
+  copy(sample.integral_error_rad_s, message.integral_error_rad_s);
+  copy(sample.commanded_torque_nm, message.commanded_torque_nm);
+  copy(sample.applied_torque_nm, message.applied_torque_nm);
+  copy(sample.premise, message.premise);
+  message.membership_sum = sample.membership_sum;
+  message.premise_excess = sample.premise_excess;
+  message.lyapunov_rad2 = sample.lyapunov_rad2;
+  return message;
 }
 
 template void encode(const measurement_v2&, Packet&) noexcept;

@@ -48,7 +48,7 @@ void TelemetryPublisher::run() {
 }
 
 void TelemetryPublisher::drain() {
-  telemetry_v1 sample;
+  TelemetrySample sample;
   while (ring_->pop(sample)) {
     if (link_ != nullptr) {
       link_->send(sample);
@@ -75,15 +75,15 @@ void TelemetryPublisher::write_header() {
   csv_->end_row();
 }
 
-void TelemetryPublisher::write_row(const telemetry_v1& sample) {
+void TelemetryPublisher::write_row(const TelemetrySample& sample) {
   csv_->add(sample.seq);
   csv_->add(static_cast<double>(sample.seq) * sample_period_s_);
-  for (const double* values :
-       {sample.measured_angle_rad, sample.measured_speed_rad_s, sample.reference_angle_rad,
-        sample.reference_speed_rad_s, sample.reference_acceleration_rad_s2, sample.commanded_torque_nm,
-        sample.applied_torque_nm, sample.estimated_angle_rad, sample.estimated_speed_rad_s,
-        sample.estimated_disturbance, sample.filtered_disturbance, sample.integral_error_rad_s}) {
-    csv_->add(values, joints_);
+  for (const JointArray* values :
+       {&sample.measured_angle_rad, &sample.measured_speed_rad_s, &sample.reference_angle_rad,
+        &sample.reference_speed_rad_s, &sample.reference_acceleration_rad_s2, &sample.commanded_torque_nm,
+        &sample.applied_torque_nm, &sample.estimated_angle_rad, &sample.estimated_speed_rad_s,
+        &sample.estimated_disturbance, &sample.filtered_disturbance, &sample.integral_error_rad_s}) {
+    csv_->add(values->data(), joints_);
   }
   for (const double value : {sample.membership_sum, sample.premise_excess, sample.lyapunov_rad2}) {
     csv_->add(value);

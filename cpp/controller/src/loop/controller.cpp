@@ -4,13 +4,10 @@
 
 namespace quasilpv {
 
-std::unique_ptr<ControlLaw> make_law(const Artifact& artifact) {
-  const LawSettings settings{artifact.sample_period_s(), artifact.joints(), artifact.limits()};
-  return std::visit([&settings](const auto& parameters) { return make_law(parameters, settings); }, artifact.law());
-}
-
 Controller::Controller(const Artifact& artifact)
-    : law_(make_law(artifact)), sample_period_s_(artifact.sample_period_s()), joints_(artifact.joints()) {}
+    : law_(artifact.law().make_law({artifact.sample_period_s(), artifact.joints(), artifact.limits()})),
+      sample_period_s_(artifact.sample_period_s()),
+      joints_(artifact.joints()) {}
 
 Controller::~Controller() = default;
 Controller::Controller(Controller&&) noexcept = default;

@@ -25,8 +25,7 @@ double largest_row_sum(const BlockPolytope& inertia, Eigen::Index row) {
 }
 
 double largest_acceleration(const Artifact& artifact) {
-  const BlockPolytope& inertia =
-      std::visit([](const auto& law) -> const BlockPolytope& { return law.model.inertia; }, artifact.law());
+  const BlockPolytope& inertia = artifact.law().model.inertia;
   double acceleration = std::numeric_limits<double>::infinity();
   for (int row = 0; row < artifact.joints(); ++row) {
     const double limit = artifact.limits().torque_nm[static_cast<std::size_t>(row)];

@@ -10,14 +10,6 @@
 namespace quasilpv {
 namespace {
 
-int premises_of(const Artifact& artifact) {
-  return std::visit([](const auto& law) { return law.model.premises.outputs(); }, artifact.law());
-}
-
-void copy(const JointArray& source, double (&target)[kMaxJoints]) noexcept {
-  std::copy(source.begin(), source.end(), target);
-}
-
 void add(const Reference& offset, Reference& reference) noexcept {
   for (std::size_t j = 0; j < kMaxJoints; ++j) {
     reference.angle[j] += offset.angle[j];
@@ -41,8 +33,8 @@ ControlLoop::ControlLoop(const Artifact& artifact, const Trajectory& trajectory,
     throw InputError("trajectory '" + trajectory.name() + "'", "joints", std::to_string(trajectory.joints()),
                      std::to_string(artifact.joints()) + " as in artifact '" + artifact.name() + "'");
   }
-  telemetry_.premises = premises_of(artifact);
-  telemetry_.realtime = settings.realtime ? 1 : 0;
+  telemetry_.premises = artifact.law().model.premises.outputs();
+  telemetry_.realtime = settings.realtime;
 }
 
 void ControlLoop::handle(const RobotReading& reading, const SampleConditions& conditions) noexcept {
@@ -244,25 +236,25 @@ void ControlLoop::write_command(const StepReport& report, const StepInput& input
 
 void ControlLoop::write_telemetry(const StepInput& input, const StepReport& report, std::int64_t step_ns) noexcept {
   telemetry_.seq = input.seq;
-  telemetry_.state = static_cast<std::int32_t>(failsafe_.state);
-  telemetry_.flags = static_cast<std::int32_t>(report.flags);
+  telemetry_.state = failsafe_.state;
+  telemetry_.flags = report.flags;
   telemetry_.step_ns = step_ns;
   const Reference on_path = path(input.seq);
-  copy(on_path.angle, telemetry_.reference_angle_rad);
-  copy(on_path.speed, telemetry_.reference_speed_rad_s);
-  copy(on_path.acceleration, telemetry_.reference_acceleration_rad_s2);
-  copy(input.angle, telemetry_.measured_angle_rad);
-  copy(input.speed, telemetry_.measured_speed_rad_s);
-  copy(report.estimated_angle, telemetry_.estimated_angle_rad);
-  copy(report.estimated_speed, telemetry_.estimated_speed_rad_s);
-  copy(report.estimated_disturbance, telemetry_.estimated_disturbance);
-  copy(report.filtered_disturbance, telemetry_.filtered_disturbance);
-  copy(report.integral_error, telemetry_.integral_error_rad_s);
+  telemetry_.reference_angle_rad = on_path.angle;
+  telemetry_.reference_speed_rad_s = on_path.speed;
+  telemetry_.reference_acceleration_rad_s2 = on_path.acceleration;
+  telemetry_.measured_angle_rad = input.angle;
+  telemetry_.measured_speed_rad_s = input.speed;
+  telemetry_.estimated_angle_rad = report.estimated_angle;
+  telemetry_.estimated_speed_rad_s = report.estimated_speed;
+  telemetry_.estimated_disturbance = report.estimated_disturbance;
+  telemetry_.filtered_disturbance = report.filtered_disturbance;
+  telemetry_.integral_error_rad_s = report.integral_error;
   // In Fault the law runs on beside a robot that it does not move; what it would command then is nobody's torque.
   const bool is_law_in_force = failsafe_.state != ControllerState::kFault;
-  copy(is_law_in_force ? report.torque_commanded : last_torque_, telemetry_.commanded_torque_nm);
-  copy(last_torque_, telemetry_.applied_torque_nm);
-  std::copy(report.premise.begin(), report.premise.end(), telemetry_.premise);
+  telemetry_.commanded_torque_nm = is_law_in_force ? report.torque_commanded : last_torque_;
+  telemetry_.applied_torque_nm = last_torque_;
+  telemetry_.premise = report.premise;
   const MonitorReport seen = monitor_.observe(input, report);
   telemetry_.membership_sum = seen.membership_sum;
   telemetry_.premise_excess = seen.premise_excess;

@@ -5,11 +5,9 @@
 namespace quasilpv {
 
 Monitor::Monitor(const Artifact& artifact)
-    : model_(std::visit([](const auto& law) { return law.model; }, artifact.law())),
-      sample_period_s_(artifact.sample_period_s()) {
-  if (const auto* law = std::get_if<DobAccelerationParameters>(&artifact.law())) {
-    bound_ = law->lyapunov_bound;
-    innovation_share_ = 1.0 - law->observer[0];
+    : model_(artifact.law().model), sample_period_s_(artifact.sample_period_s()) {
+  if (const LyapunovBound* const bound = artifact.law().lyapunov_bound()) {
+    bound_ = *bound;
   }
 }
 
@@ -34,7 +32,7 @@ double Monitor::lyapunov(const LyapunovBound& bound, const StepInput& input, con
   for (int joint = 0; joint < kMaxJoints; ++joint) {
     const auto j = static_cast<std::size_t>(joint);
     signals.col(joint) << input.angle[j] - input.reference.angle[j],
-        (input.angle[j] - report.estimated_angle[j]) / innovation_share_,
+        (input.angle[j] - report.estimated_angle[j]) / bound.innovation_share,
         T * (report.estimated_speed[j] - input.reference.speed[j]),
         T * T * (report.estimated_disturbance[j] - report.filtered_disturbance[j]), report.integral_error[j] / T;
   }

@@ -4,18 +4,13 @@
 #include <cmath>
 #include <string>
 
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
 
 namespace quasilpv {
 namespace {
 
 constexpr double kTurn = 6.283185307179586;
 constexpr double kWidening = 0.5;  // of an interval, to each side, while the arm moves
-
-bool reads_speed(const Artifact& artifact) {
-  return !std::holds_alternative<DobAccelerationParameters>(artifact.law()) &&
-         !std::holds_alternative<DobTorqueParameters>(artifact.law());
-}
 
 bool is_within(double value, const Interval& interval) noexcept {
   return value >= interval.low && value <= interval.high;  // false for NaN
@@ -40,7 +35,7 @@ std::string to_string(const StartRefusal& refusal) {
 Plausibility::Plausibility(const Artifact& artifact)
     : joints_(static_cast<std::size_t>(artifact.joints())),
       sample_period_s_(artifact.sample_period_s()),
-      reads_speed_(reads_speed(artifact)),
+      reads_speed_(artifact.law().reads_speed()),
       domain_(artifact.domain()) {
   for (std::size_t j = 0; j < joints_; ++j) {
     fastest_[j] = kSpeedFactor * domain_.fastest(j);

@@ -10,14 +10,10 @@ constexpr double kDampingShare = 0.1;
 
 double finite_or_zero(double value) noexcept { return std::isfinite(value) ? value : 0.0; }
 
-const Program& gravity_of(const Artifact& artifact) {
-  return std::visit([](const auto& law) -> const Program& { return law.model.gravity; }, artifact.law());
-}
-
 }  // namespace
 
 SafeTorque::SafeTorque(const Artifact& artifact, SafeAction action)
-    : gravity_(gravity_of(artifact)),
+    : gravity_(artifact.law().model.gravity),
       action_(action),
       torque_limit_(artifact.limits().torque_nm),
       joints_(static_cast<std::size_t>(artifact.joints())) {

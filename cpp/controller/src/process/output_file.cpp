@@ -13,7 +13,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
 #include "quasilpv/errors.hpp"
 
 namespace quasilpv {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
+#include <memory>
 #include <utility>
 
 #include "quasilpv/external_torque.hpp"
@@ -77,5 +79,8 @@ class Plant {
   JointArray torque_{};
   ExternalTorque external_;
 };
+
+/// Makes one plant, at rest under no torque, as often as it is called. Throws InputError.
+using PlantFactory = std::function<std::unique_ptr<Plant>()>;
 
 }  // namespace quasilpv

@@ -10,7 +10,6 @@
 #include "quasilpv/external_torque.hpp"
 #include "quasilpv/integrator.hpp"
 #include "quasilpv/plant.hpp"
-#include "quasilpv/plant_parameters.hpp"
 #include "quasilpv/sensors.hpp"
 #include "quasilpv/step.hpp"
 
@@ -20,7 +19,7 @@ namespace quasilpv {
 struct Scenario {
   std::string name;
   double duration_s = 0.0;
-  PlantParameters plant;
+  PlantFactory plant;
   IntegratorOptions integrator;
   std::vector<SineTorque> external_torque;
   SensorOptions sensors;

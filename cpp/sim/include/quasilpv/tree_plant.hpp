@@ -24,9 +24,6 @@ struct TreePlantParameters {
   std::vector<JointFriction> friction;  ///< one per joint
 };
 
-/// The member `plant` of a scenario, kind `tree`. INIT-ONLY. Throws InputError.
-TreePlantParameters read_tree_plant(const Field& field);
-
 /// The robot as a plant, y = (q, w): joint coordinates (rad; m for a joint that slides) and their rates.
 ///
 ///     q' - w = 0

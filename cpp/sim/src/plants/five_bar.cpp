@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "plants/plant_table.hpp"
 #include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
 
@@ -343,4 +344,27 @@ double FiveBar::energy(const Coordinates& phi, const Coordinates& v) const noexc
          gravity_passive_ * at.cosine.tail<2>().sum() + 0.5 * parameters_.spring_nm_rad * stretch.squaredNorm();
 }
 
+namespace plants {
+
+PlantKind five_bar() {
+  using P = FiveBarParameters;
+  PlantTable<P> five_bar;
+  five_bar.text("label", &P::label);
+  five_bar.number("gravity_m_s2", &P::gravity_m_s2);
+  five_bar.object("active", &P::active, planar_link_table());
+  five_bar.object("passive", &P::passive, planar_link_table());
+  five_bar.number("spring_nm_rad", &P::spring_nm_rad);
+  five_bar.numbers("spring_rest_rad", &P::spring_rest_rad);
+  five_bar.add({"formulation", "text"}, [](const Field& field, int /*joints*/, P& parameters) {
+    const std::string name = field.text();
+    if (name != "index1" && name != "ggl") {
+      field.fail_choice({"index1", "ggl"});
+    }
+    parameters.formulation = name == "ggl" ? FiveBarFormulation::kGgl : FiveBarFormulation::kIndex1;
+  });
+  five_bar.number("baumgarte_per_s", &P::baumgarte_per_s);
+  return five_bar.kind<FiveBar>("five-bar", check_five_bar);
+}
+
+}  // namespace plants
 }  // namespace quasilpv

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "plants/plant_table.hpp"
 #include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
 
@@ -24,6 +25,16 @@ void check_link(const PlanarLink& link, const std::string& source, const std::st
   const double point_mass_inertia = link.mass_kg * link.com_m * link.com_m;
   require(link.inertia_kg_m2 >= point_mass_inertia * (1.0 - 1e-12), "inertia_kg_m2", link.inertia_kg_m2,
           ">= mass_kg com_m^2 = " + format_number(point_mass_inertia) + " about the joint axis (indefinite inertia)");
+}
+
+PlantTable<PlanarLink> planar_link_table() {
+  PlantTable<PlanarLink> link;
+  link.size("length_m", &PlanarLink::length_m);
+  link.size("mass_kg", &PlanarLink::mass_kg);
+  link.number("com_m", &PlanarLink::com_m);
+  link.size("inertia_kg_m2", &PlanarLink::inertia_kg_m2);
+  link.number("friction_nm_s", &PlanarLink::friction_nm_s);
+  return link;
 }
 
 }  // namespace quasilpv

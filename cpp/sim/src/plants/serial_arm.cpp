@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "plants/plant_table.hpp"
 #include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
 
@@ -237,4 +238,16 @@ double SerialArm::energy(ConstVector angle, ConstVector speed) const {
   return 0.5 * rate.dot(mass_matrix(at) * rate) - gravity_moment_.dot(at.cosine);
 }
 
+namespace plants {
+
+PlantKind serial_arm() {
+  using P = SerialArmParameters;
+  PlantTable<P> arm;
+  arm.text("label", &P::label);
+  arm.number("gravity_m_s2", &P::gravity_m_s2);
+  arm.list("links", &P::links, planar_link_table());
+  return arm.kind<SerialArm>("serial-arm", check_serial_arm);
+}
+
+}  // namespace plants
 }  // namespace quasilpv

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "plants/plant_table.hpp"
 #include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
 
@@ -100,4 +101,21 @@ PlantSample SpringDisc::sample(double t, ConstVector y) const {
   return {{y[0] / parameters_.radius_m}, {y[2]}, {y_dot[2]}, external_torque().at(t)};
 }
 
+namespace plants {
+
+PlantKind spring_disc() {
+  using P = SpringDiscParameters;
+  PlantTable<P> disc;
+  disc.text("label", &P::label);
+  disc.size("mass_kg", &P::mass_kg);
+  disc.size("radius_m", &P::radius_m);
+  disc.size("inertia_kg_m2", &P::inertia_kg_m2);
+  disc.number("inertia_uncertainty_per_kg", &P::inertia_uncertainty_per_kg);
+  disc.number("stiffness_n_m", &P::stiffness_n_m);
+  disc.number("cubic_stiffness_n_m3", &P::cubic_stiffness_n_m3);
+  disc.number("damping_n_s_m", &P::damping_n_s_m);
+  return disc.kind<SpringDisc>("spring-disc", check_spring_disc);
+}
+
+}  // namespace plants
 }  // namespace quasilpv

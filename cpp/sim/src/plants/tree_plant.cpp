@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "plants/registry.hpp"
 #include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
 
@@ -29,8 +30,6 @@ JointArray joint_array(Plant::ConstVector x) noexcept {
   return array;
 }
 
-}  // namespace
-
 TreePlantParameters read_tree_plant(const Field& field) {
   field.only({"kind", "label", "gravity_m_s2", "joints"});
   TreePlantParameters parameters;
@@ -45,6 +44,8 @@ TreePlantParameters read_tree_plant(const Field& field) {
   }
   return parameters;
 }
+
+}  // namespace
 
 TreePlant::TreePlant(TreePlantParameters parameters)
     : parameters_(std::move(parameters)), dynamics_(parameters_.tree) {}
@@ -116,4 +117,13 @@ PlantSample TreePlant::sample(double t, ConstVector y) const {
   return {joint_array(y.head(n)), joint_array(y.tail(n)), joint_array(y_dot.tail(n)), external_torque().at(t)};
 }
 
+namespace plants {
+
+PlantKind tree() {
+  return {"tree", [](const Field& plant) -> PlantFactory {
+            return [parameters = read_tree_plant(plant)] { return std::make_unique<TreePlant>(parameters); };
+          }};
+}
+
+}  // namespace plants
 }  // namespace quasilpv

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <nlohmann/json.hpp>
 #include <utility>
 
-#include "quasilpv/document.hpp"
+#include "document/document.hpp"
+#include "plants/registry.hpp"
 
 namespace quasilpv {
 namespace {
@@ -61,7 +63,7 @@ IntegratorOptions integrator(const Field& field) {
     field.only({"kind", "steps_per_sample"});
     return Rk4Options{static_cast<int>(field["steps_per_sample"].integer(1, kMaxStepsPerSample))};
   }
-  field["kind"].fail("\"" + kind + "\"", "\"ida\" or \"rk4\"");
+  field["kind"].fail_choice({"ida", "rk4"});
 }
 
 std::vector<SineTorque> external_torque(const Field& field, int joints) {
@@ -120,7 +122,7 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
     root["name"].fail("an empty name", "a name");
   }
   scenario.duration_s = at_most(kMaxDurationS, root["duration_s"], root["duration_s"].positive());
-  scenario.plant = read_plant(root["plant"], source);
+  scenario.plant = read_plant(root["plant"]);
   const int n = scenario.joints();
   scenario.integrator = quasilpv::integrator(root["integrator"]);
   scenario.external_torque = quasilpv::external_torque(root["external_torque"], n);
@@ -134,10 +136,10 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
   return scenario;
 }
 
-int Scenario::joints() const { return quasilpv::make_plant(plant)->joints(); }
+int Scenario::joints() const { return plant()->joints(); }
 
 std::unique_ptr<Plant> Scenario::make_plant() const {
-  std::unique_ptr<Plant> made = quasilpv::make_plant(plant);
+  std::unique_ptr<Plant> made = plant();
   made->set_external_torque(ExternalTorque(external_torque));
   return made;
 }

@@ -1,0 +1,55 @@
+// What the loop needs to know of a law, whatever its kind.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+#include "quasilpv/block_polytope.hpp"
+#include "quasilpv/control_law.hpp"
+#include "quasilpv/program.hpp"
+#include "quasilpv/step.hpp"
+
+namespace quasilpv {
+
+/// What every law knows of the robot: z(y), M_n(z) in kg m^2, G(y) in N m.
+struct DesignModel {
+  Program premises;
+  BlockPolytope inertia;
+  Program gravity;
+};
+
+/// A proved lower bound of the Lyapunov function of a moving robot (docs/concepts/motion.md), rad^2: the trace of
+/// `joints` Z' `signals` Z. The rows of Z, one column per joint, are what is known of the loop, all in rad: the angle
+/// error y - r, the innovation, T (w - r'), T^2 (d - d_f) and e_I / T.
+struct LyapunovBound {
+  static constexpr int kSignals = 5;
+  Eigen::Matrix<double, kSignals, kSignals> signals;     ///< symmetric positive definite
+  Eigen::Matrix<double, kMaxJoints, kMaxJoints> joints;  ///< the same; zero from the number of joints on
+  double innovation_share = 1.0;                         ///< what the correction leaves of the innovation, != 0: 1 - l1
+};
+
+/// The parameters of a law, read from an artifact and never changed. Each kind of law is a class of its own, in one
+/// file of `src/laws` that nobody else includes; the registry beside them names all kinds.
+class LawParameters {
+ public:
+  virtual ~LawParameters() = default;
+  LawParameters& operator=(const LawParameters&) = delete;
+
+  DesignModel model;
+
+  /// Whether the law reads measured speeds.
+  virtual bool reads_speed() const noexcept = 0;
+  /// The Coriolis torque that the law feeds forward, as the law defines it; null: none.
+  virtual const Program* coriolis() const noexcept { return nullptr; }
+  /// What the monitor watches; null: the law was not designed for one.
+  virtual const LyapunovBound* lyapunov_bound() const noexcept { return nullptr; }
+
+  /// The law with these parameters, at its beginning. Dispatches once on the number of joints. INIT-ONLY.
+  virtual std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const = 0;
+
+ protected:
+  LawParameters() = default;
+  LawParameters(const LawParameters&) = default;
+};
+
+}  // namespace quasilpv

@@ -1,0 +1,60 @@
+#include "artifact/matrices.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <nlohmann/json.hpp>
+
+namespace quasilpv {
+namespace {
+
+constexpr double kSymmetryTolerance = 1e-12;      // relative to the largest entry
+constexpr double kDefinitenessTolerance = 1e-12;  // smallest over largest eigenvalue
+
+void require_symmetric(const Field& field, const std::string& name, const Eigen::MatrixXd& matrix,
+                       const std::string& expected) {
+  const double asymmetry = (matrix - matrix.transpose()).cwiseAbs().maxCoeff();
+  if (!(asymmetry <= kSymmetryTolerance * matrix.cwiseAbs().maxCoeff())) {
+    field.fail(name + " with asymmetry " + Json(asymmetry).dump(), expected);
+  }
+}
+
+void require_positive_definite(const Field& field, const std::string& where, const Eigen::MatrixXd& matrix,
+                               const std::string& expected) {
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
+  const double smallest = eigenvalues.minCoeff();
+  if (!(smallest > kDefinitenessTolerance * eigenvalues.cwiseAbs().maxCoeff())) {
+    field.fail("smallest eigenvalue " + Json(smallest).dump() + where, expected);
+  }
+}
+
+}  // namespace
+
+// Only the centre is tested for definiteness: premises depend on each other, so a corner of the box need not be a
+// configuration of the robot, and the design inertia may rightly be indefinite there.
+BlockPolytope read_inertia(const Field& field, int joints) {
+  BlockPolytope inertia = BlockPolytope::parse(field, joints, joints);
+  for (int i = 0; i < inertia.vertices(); ++i) {
+    require_symmetric(field["blocks"], "vertex " + std::to_string(i), inertia.vertex(i), "symmetric vertices");
+  }
+  require_positive_definite(field, " at the centre of the box", inertia.at_centre(), "a positive definite inertia");
+  return inertia;
+}
+
+Eigen::MatrixXd read_lyapunov(const Field& field, int size) {
+  Eigen::MatrixXd lyapunov = parse_matrix(field, size, size);
+  require_symmetric(field, "a matrix", lyapunov, "a symmetric matrix");
+  require_positive_definite(field, "", lyapunov, "a positive definite matrix");
+  return lyapunov;
+}
+
+BlockPolytope read_lyapunov_polytope(const Field& field, int size) {
+  BlockPolytope lyapunov = BlockPolytope::parse(field, size, size);
+  for (int k = 0; k < lyapunov.vertices(); ++k) {
+    const std::string vertex = "vertex " + std::to_string(k);
+    require_symmetric(field["blocks"], vertex, lyapunov.vertex(k), "symmetric vertices");
+    require_positive_definite(field["blocks"], " of " + vertex, lyapunov.vertex(k), "positive definite vertices");
+  }
+  return lyapunov;
+}
+
+}  // namespace quasilpv

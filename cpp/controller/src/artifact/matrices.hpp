@@ -1,0 +1,35 @@
+// Matrices of an artifact that must be symmetric and positive definite, and values per joint.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+#include "document/field.hpp"
+#include "quasilpv/block_polytope.hpp"
+#include "quasilpv/step.hpp"
+
+namespace quasilpv {
+
+/// A design inertia: symmetric vertices, positive definite at the centre. INIT-ONLY, as all here. Throws InputError.
+BlockPolytope read_inertia(const Field& field, int joints);
+
+/// P of size x size, symmetric and positive definite. Throws InputError.
+Eigen::MatrixXd read_lyapunov(const Field& field, int size);
+
+/// P of size x size by vertices, each symmetric and positive definite. Throws InputError.
+BlockPolytope read_lyapunov_polytope(const Field& field, int size);
+
+/// One value per joint, each read by `read`. Throws InputError.
+template <class Read>
+JointArray read_joint_values(const Field& field, int joints, Read read) {
+  if (field.size() != static_cast<std::size_t>(joints)) {
+    field.fail("an array of " + std::to_string(field.size()), std::to_string(joints) + " values, one per joint");
+  }
+  JointArray values{};
+  for (std::size_t j = 0; j < field.size(); ++j) {
+    values[j] = read(field.at(j));
+  }
+  return values;
+}
+
+}  // namespace quasilpv

@@ -1,0 +1,110 @@
+// What the laws with a disturbance observer share: one sample, around the coordinates that tell them apart.
+#pragma once
+
+#include <cmath>
+
+#include "laws/common/observer_state.hpp"
+
+namespace quasilpv {
+
+/// Parameters of a law with a disturbance observer.
+struct ObserverParameters : LawParameters {
+  double filter_time_constant_s = 0.0;  ///< of the disturbance filter, > 0
+
+  bool reads_speed() const noexcept final { return false; }
+};
+
+/// One sample of a law that reads angles only and observes x_hat = [th, w, disturbance, its rate]. Starts at
+/// x_hat = (y, w_0, 0, 0), d_f = e_I = 0, with w_0 = 0 unless take_over() knows better. Without a valid measurement the
+/// innovation is zero, the prediction stands in for y, and e_I is frozen. A state that overflowed is dropped: the law
+/// starts again at the next valid measurement.
+template <int N>
+class ObserverLaw : public ControlLaw {
+ public:
+  StepReport step(const StepInput& input) noexcept final {
+    StepReport report;
+    report.seq = input.seq;
+    const JointVector<N> measured = from_array<N>(input.angle);
+    const bool valid = input.valid && measured.allFinite();
+    report.flags = valid ? kStepHealthy : kMeasurementInvalid;
+    if (!started_) {
+      if (!valid) {
+        report.torque_applied = limiter_.last_applied();
+        return report;
+      }
+      start(measured);
+    }
+    const ReferenceVectors<N> reference = reference_.accept(input.reference, report);
+    const JointVector<N> y = valid ? measured : state_.angle;
+    const ModelSample<N> model = sample_model<N>(model_, y, report);
+    if (valid) {
+      correct(measured, report, state_);
+    }
+    state_.filter(filter_pole_);
+    state_.write_to(report);
+    const Command<N> command = control(state_, model, reference, report);
+    to_array<N>(command.torque, report.torque_commanded);
+    report.flags |= limiter_.apply(report.torque_commanded, input.commanded, report.torque_applied);
+    if (valid) {
+      integrate_error<N>(y - reference.angle, command.integral_gain, report, sample_period_s_, state_.integral_error);
+    }
+    const Motion motion = predict(state_, model, reference, report);
+    state_.advance(sample_period_s_, motion.acceleration, motion.jerk);
+    started_ = state_.is_finite();
+    return report;
+  }
+
+  void reset() noexcept final {
+    started_ = false;
+    first_speed_.setZero();
+    limiter_.reset();
+  }
+
+  void take_over(const JointArray& in_force, const JointArray& speed) noexcept final {
+    reset();
+    first_speed_ = from_array<N>(speed);
+    limiter_.take_over(in_force);
+  }
+
+ protected:
+  /// What is held over the period that follows.
+  struct Motion {
+    JointVector<N> acceleration;
+    JointVector<N> jerk;
+  };
+
+  ObserverLaw(const ObserverParameters& parameters, const LawSettings& settings)
+      : model_(parameters.model),
+        sample_period_s_(settings.sample_period_s),
+        filter_pole_(std::exp(-settings.sample_period_s / parameters.filter_time_constant_s)),
+        limiter_(settings.limits, settings.sample_period_s, N) {}
+
+ private:
+  void start(const JointVector<N>& measured) noexcept {
+    state_ = ObserverState<N>::undisturbed(measured, first_speed_);
+    first_speed_.setZero();  // of this start only
+    reference_.reset(measured);
+    started_ = true;
+  }
+
+  /// Corrects the estimate by what was measured; the premises are in the report.
+  virtual void correct(const JointVector<N>& measured, StepReport& report, ObserverState<N>& state) noexcept = 0;
+  /// The torque of this sample, before limits; the premises are in the report.
+  virtual Command<N> control(const ObserverState<N>& state, const ModelSample<N>& model,
+                             const ReferenceVectors<N>& reference, StepReport& report) noexcept = 0;
+  /// With the torque that acts on the plant, in the report, so that limits do not disturb the observer. If the model
+  /// has no finite answer (gravity not finite, inertia not positive definite), kModelInvalid is set.
+  virtual Motion predict(const ObserverState<N>& state, const ModelSample<N>& model,
+                         const ReferenceVectors<N>& reference, StepReport& report) noexcept = 0;
+
+  DesignModel model_;
+  double sample_period_s_;
+  double filter_pole_;
+  Limiter limiter_;
+  ReferenceGuard<N> reference_;
+  ObserverState<N> state_;
+  JointVector<N> first_speed_ = JointVector<N>::Zero();
+  bool started_ = false;
+};
+
+}  // namespace quasilpv

@@ -1,0 +1,137 @@
+// The default law: feedback, disturbance observer and prediction in acceleration coordinates.
+#include "laws/common/law_table.hpp"
+#include "laws/common/observer_law.hpp"
+
+namespace quasilpv {
+namespace {
+
+/// Scalars of the sampled law, the same for every joint. Errors are x - x_r: stabilising kp, kd and ki are negative.
+struct DobAccelerationParameters final : ObserverParameters {
+  struct Feedback {
+    double kp = 0.0;  ///< 1/s^2
+    double kd = 0.0;  ///< 1/s
+    double ki = 0.0;  ///< 1/s^3
+  };
+
+  Feedback feedback;
+  std::array<double, 4> observer{};      ///< l1 (1), l2 (1/s), l3 (1/s^2), l4 (1/s^3)
+  bool disturbance_compensation = true;  ///< false: observed and predicted, but not subtracted
+  std::optional<LyapunovBound> bound;    ///< none: not designed for one
+
+  const LyapunovBound* lyapunov_bound() const noexcept override { return bound ? &*bound : nullptr; }
+  std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
+};
+
+/// Per sample, with x_hat = [th, w, a_d, j_d] (angle, speed, disturbance acceleration and its rate):
+///
+///     M, G   = M_n(z(y)), G(y)
+///     x_hat += [l1, l2, l3, l4] (y - th)                                          current estimator
+///     d_f    = q d_f + (1 - q) a_d,  q = exp(-T/T_f)                              exact filter
+///     a_cmd  = r'' - d_f + kp (th - r) + kd (w - r') + ki e_I
+///     Gamma  = M a_cmd + G, limited
+///     e_I   += T (y - r)                                                          anti-windup: see integrate_error()
+///     a_app  = M^-1 (Gamma_applied - G) + a_d
+///     th    += T w + T^2/2 a_app + T^3/6 j_d;  w += T a_app + T^2/2 j_d;  a_d += T j_d     exact zero-order hold
+///
+/// Start and samples without a measurement: see ObserverLaw. Coriolis torque is part of the disturbance.
+/// Source: Dehak 2022, section IV.3, carried over to accelerations and discrete time.
+template <int N>
+class DobAccelerationLaw final : public ObserverLaw<N> {
+ public:
+  DobAccelerationLaw(const DobAccelerationParameters& parameters, const LawSettings& settings)
+      : ObserverLaw<N>(parameters, settings), parameters_(parameters) {}
+
+ private:
+  using typename ObserverLaw<N>::Motion;
+
+  void correct(const JointVector<N>& measured, StepReport& /*report*/, ObserverState<N>& state) noexcept override {
+    const JointVector<N> innovation = measured - state.angle;
+    state.angle += parameters_.observer[0] * innovation;
+    state.speed += parameters_.observer[1] * innovation;
+    state.disturbance += parameters_.observer[2] * innovation;
+    state.disturbance_rate += parameters_.observer[3] * innovation;
+  }
+
+  Command<N> control(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& reference,
+                     StepReport& /*report*/) noexcept override {
+    const JointVector<N> feedback = parameters_.feedback.kp * (state.angle - reference.angle) +
+                                    parameters_.feedback.kd * (state.speed - reference.speed) +
+                                    parameters_.feedback.ki * state.integral_error;
+    if (parameters_.disturbance_compensation) {
+      acceleration_ = reference.acceleration - state.filtered_disturbance + feedback;
+    } else {
+      acceleration_ = reference.acceleration + feedback;
+    }
+    return {model.inertia * acceleration_ + model.gravity, JointVector<N>::Constant(parameters_.feedback.ki)};
+  }
+
+  // If the model has no finite answer, the commanded acceleration is predicted.
+  Motion predict(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& /*reference*/,
+                 StepReport& report) noexcept override {
+    JointVector<N> applied = model.acceleration(from_array<N>(report.torque_applied) - model.gravity);
+    if (!applied.allFinite()) {
+      applied = acceleration_;
+      report.flags |= kModelInvalid;
+    }
+    applied += state.disturbance;
+    return {applied, state.disturbance_rate};
+  }
+
+  DobAccelerationParameters parameters_;
+  JointVector<N> acceleration_ = JointVector<N>::Zero();  // commanded in this sample
+};
+
+std::unique_ptr<ControlLaw> DobAccelerationParameters::make_law(const LawSettings& settings) const {
+  return make_law_of_size<DobAccelerationLaw>(*this, settings);
+}
+
+MemberTable<DobAccelerationParameters::Feedback> feedback_table() {
+  using F = DobAccelerationParameters::Feedback;
+  MemberTable<F> feedback;
+  feedback.number("kp", &F::kp);
+  feedback.number("kd", &F::kd);
+  feedback.number("ki", &F::ki);
+  return feedback;
+}
+
+MemberTable<LyapunovBound> bound_table() {
+  MemberTable<LyapunovBound> bound;
+  bound.add({"signals", "matrix"}, [](const Field& field, int /*joints*/, LyapunovBound& target) {
+    target.signals = read_lyapunov(field, LyapunovBound::kSignals);
+  });
+  bound.add({"joints", "matrix"}, [](const Field& field, int joints, LyapunovBound& target) {
+    target.joints.setZero();
+    target.joints.topLeftCorner(joints, joints) = read_lyapunov(field, joints);
+  });
+  return bound;
+}
+
+// The innovation is read off the corrected estimate, y - th = (1 - l1) (y - predicted angle).
+void read_innovation_share(const Field& law, DobAccelerationParameters& parameters) {
+  if (!parameters.bound) {
+    return;
+  }
+  parameters.bound->innovation_share = 1.0 - parameters.observer[0];
+  if (parameters.bound->innovation_share == 0.0) {
+    law["observer"].at(0).fail("1", "another number with law.lyapunov_bound");
+  }
+}
+
+}  // namespace
+
+namespace laws {
+
+LawKind dob_acceleration() {
+  using P = DobAccelerationParameters;
+  LawTable<P> law("dob-acceleration");
+  law.object("feedback", &P::feedback, feedback_table());
+  law.numbers("observer", &P::observer);
+  law.positive("filter_time_constant_s", &P::filter_time_constant_s);
+  law.boolean("disturbance_compensation", &P::disturbance_compensation);
+  law.object("lyapunov_bound", &P::bound, bound_table());
+  law.finish(read_innovation_share);
+  return law.kind();
+}
+
+}  // namespace laws
+}  // namespace quasilpv
