@@ -39,8 +39,9 @@ def test_every_place_that_says_the_version_says_the_same() -> None:
     assert f"project(quasilpv VERSION {version} " in (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     minor = version.rpartition(".")[0]
-    downstream = (ROOT / "examples/downstream/CMakeLists.txt").read_text(encoding="utf-8")
-    assert f"find_package(quasilpv {minor} REQUIRED)" in downstream
+    for example in ("downstream", "downstream_core"):
+        asked = (ROOT / "examples" / example / "CMakeLists.txt").read_text(encoding="utf-8")
+        assert f"find_package(quasilpv {minor} REQUIRED" in asked
 
 
 def runtime_packages(suite: str) -> set[str]:
@@ -134,18 +135,56 @@ def test_when_the_wheel_is_installed_alone_expect_the_demo_to_do_the_main_job(
 # ---- the C++ package -------------------------------------------------------------------------------------------------
 
 
+NO_TRANSPORT = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in ("LCM", "Sodium", "SUNDIALS", "CLI11")]
+"""To CMake, these are not on this machine."""
+
+
 @pytest.fixture(scope="module")
-def downstream(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The program of examples/downstream, built away from the source tree against an installation of its own."""
-    folder = tmp_path_factory.mktemp("downstream")
-    install = ("--install", BUILT, "--component", "development", "--prefix", folder / "prefix")
-    run("cmake", *install, cwd=folder)
-    shutil.copytree(ROOT / "examples/downstream", folder / "source")
-    search = f"-DCMAKE_PREFIX_PATH={folder / 'prefix'}"
-    run("cmake", "-S", folder / "source", "-B", folder / "build", "-G", "Ninja", search, cwd=folder)
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Headers, libraries and package files in a prefix of their own."""
+    prefix = tmp_path_factory.mktemp("installed")
+    run("cmake", "--install", BUILT, "--component", "development", "--prefix", prefix, cwd=prefix)
+    assert str(ROOT) not in "".join(path.read_text() for path in prefix.rglob("*.cmake"))
+    return prefix
+
+
+def build_example(name: str, installed: Path, folder: Path, *options: str) -> Path:
+    """Build a project of examples away from the source tree against an installation. Returns its build folder."""
+    shutil.copytree(ROOT / "examples" / name, folder / "source")
+    search = f"-DCMAKE_PREFIX_PATH={installed}"
+    run("cmake", "-S", folder / "source", "-B", folder / "build", "-G", "Ninja", search, *options, cwd=folder)
     run("cmake", "--build", folder / "build", cwd=folder)
-    assert str(ROOT) not in "".join(path.read_text() for path in (folder / "prefix").rglob("*.cmake"))
-    return folder / "build" / "closed_loop"
+    return folder / "build"
+
+
+@pytest.fixture(scope="module")
+def downstream(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The program of examples/downstream."""
+    return build_example("downstream", installed, tmp_path_factory.mktemp("downstream")) / "closed_loop"
+
+
+@pytest.mark.full
+def test_when_a_project_asks_for_the_core_expect_the_answers_of_the_bindings_on_a_machine_without_transport(
+    installed: Path, tmp_path: Path
+) -> None:
+    program = build_example("downstream_core", installed, tmp_path / "project", *NO_TRANSPORT) / "hold"
+    kept_design(DesignRequest.of("arm3", "pid", Specification()), folder=tmp_path / "cache")
+    [file] = (tmp_path / "cache").rglob("artifact.json")
+    controller = _runtime.Controller(_runtime.Artifact.load(str(file)))
+    rest = np.zeros(3)
+    for seq in range(4):
+        report = controller.step(rest, rest, rest, rest, rest, seq)
+    said = [float(line) for line in run(program, file, "4", cwd=tmp_path).split()]
+    assert said == report.torque_applied[:3].tolist()
+    assert not re.search(r"lcm|sodium|glib", run("ldd", program, cwd=tmp_path))
+
+
+@pytest.mark.full
+def test_on_a_machine_without_lcm_and_libsodium_the_core_builds_and_its_test_passes(tmp_path: Path) -> None:
+    options = ("-DQUASILPV_CORE_ONLY=ON", "-DCMAKE_BUILD_TYPE=Debug", *NO_TRANSPORT)
+    run("cmake", "-S", ROOT, "-B", tmp_path, "-G", "Ninja", *options, cwd=tmp_path)
+    run("cmake", "--build", tmp_path, "--parallel", "2", cwd=tmp_path)
+    assert "100% tests passed" in run("ctest", "--test-dir", tmp_path, cwd=tmp_path)
 
 
 @pytest.mark.full

@@ -16,6 +16,12 @@ def canonical_cbor(document: Any) -> bytes:
 def parse_document(data: bytes, source: str = "document") -> Any:
     """Tree of a hashed document from the bytes of either twin; refused unless canonical and its hash agrees."""
 
+LawMembers = dict[str, tuple[str, bool, "LawMembers"]]
+"""Member -> (type, optional, members of it)."""
+
+def law_schemas() -> dict[str, tuple[LawMembers, list[str]]]:
+    """Kind of a law -> (members of ``law``, names of ``programs``), as its reader has it."""
+
 class Artifact:
     """A validated controller as data. Immutable."""
 
