@@ -7,7 +7,7 @@ import json
 import pytest
 
 from quasilpv.artifact import Artifact, diff, summary
-from quasilpv.artifact.schema import REQUIRED_PROGRAMS
+from quasilpv.certificate import LAWS
 from reference.artifacts import ARM3_PROGRAMS, Change, arm3_document, at, refusal, without
 
 ARTIFACT = Artifact.from_document(arm3_document())
@@ -41,7 +41,7 @@ VERTICES = ("law", "inertia", "blocks", 0, "vertices")
         (
             at("law", "kind", value="lqr"),
             "law",
-            f"got 'lqr', expected one of {', '.join(repr(kind) for kind in REQUIRED_PROGRAMS)}",
+            f"got 'lqr', expected one of {', '.join(repr(kind) for kind in LAWS)}",
         ),
         (without("law", "kind"), "law", "got nothing, expected a member 'kind'"),
         (without("law", "observer"), "law.observer", "got nothing"),

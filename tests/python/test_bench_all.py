@@ -18,7 +18,7 @@ from bench_programs import ProgramError
 from bench_report import REPETITIONS, Report, row, spread_of
 from flint import fmpq_mat
 
-from quasilpv.certificate.exact_matrices import is_positive_definite
+from quasilpv.certificate.exact.matrices import is_positive_definite
 from quasilpv.errors import InputError
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference"

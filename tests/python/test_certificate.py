@@ -18,15 +18,16 @@ from hypothesis import strategies as st
 
 from quasilpv.arrays import FloatArray
 from quasilpv.certificate import verify
-from quasilpv.certificate.claims import Claim
-from quasilpv.certificate.exact_matrices import is_positive_definite, matrix, rational, scaled_to_unit_diagonal
-from quasilpv.certificate.vertex_tables import VertexTable
+from quasilpv.certificate.exact.claims import Claim
+from quasilpv.certificate.exact.matrices import is_positive_definite, matrix, rational, scaled_to_unit_diagonal
+from quasilpv.certificate.exact.vertex_tables import VertexTable
 from quasilpv.cli import run
 from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import InputError
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
 from quasilpv.synthesis import DesignRequest, Specification
+from reference.checked import vertex_table
 
 Document = dict[str, Any]
 POINTS = 5000
@@ -367,7 +368,7 @@ def test_when_a_table_collapses_expect_the_bound_to_cover_every_point_of_the_box
     polytope = BlockPolytope.per_premise(lower, lower + rng.uniform(0.1, 3.0, size=count))
     X = polytope.vertices(rng.normal(size=(2, 2)), rng.normal(size=(count, 2, 2)))
     table = polytope.to_document(X)
-    parsed = VertexTable.parse(table)
+    parsed = vertex_table(table)
     bound = parsed.collapse_error()
     assert bound < fmpq(1, 10**14)
     (claim,) = parsed.collapse_claim("inertia")
@@ -391,29 +392,28 @@ def test_when_a_table_collapses_expect_the_bound_to_cover_every_point_of_the_box
 
 
 def test_when_the_centre_lies_far_outside_the_box_expect_the_collapse_refused() -> None:
-    table = BlockPolytope.per_premise([0.0], [1.0]).to_document([[[1.0]], [[2.0]]])
-    table["centre"] = [3e14 + 0.1]
-    table["blocks"][0]["vertices"] = [[[1.0 / 3.0]], [[2.0 / 7.0]]]
-    (claim,) = VertexTable.parse(table).collapse_claim("inertia")
+    doubles = (((1.0 / 3.0,),), ((2.0 / 7.0,),))
+    table = VertexTable(lower=(0.0,), upper=(1.0,), centre=(3e14 + 0.1,), blocks=((0,),), doubles=doubles)
+    (claim,) = table.collapse_claim("inertia")
     assert not claim.holds
 
 
 def test_when_a_block_has_several_premises_expect_no_collapse_and_no_claim() -> None:
     polytope = BlockPolytope.takagi_sugeno([0.0, 0.0], [1.0, 1.0])
-    table = VertexTable.parse(polytope.to_document(np.ones((4, 1, 1))))
+    table = vertex_table(polytope.to_document(np.ones((4, 1, 1))))
     assert table.collapse_claim("feedback") == ()
     with pytest.raises(ValueError, match="one premise"):
         table.collapse_error()
     constant = BlockPolytope.takagi_sugeno([], []).to_document(np.full((1, 1, 1), 0.1))
-    assert VertexTable.parse(constant).collapse_error() == 0
+    assert vertex_table(constant).collapse_error() == 0
 
 
 @pytest.mark.parametrize(
     ("member", "value"),
     [("upper", [-1.0]), ("lower", [0.0, 0.0]), ("blocks", []), ("blocks", [{"premises": [0], "vertices": [[[1.0]]]}])],
 )
-def test_when_a_table_is_malformed_expect_a_value_error(member: str, value: Any) -> None:
+def test_when_a_table_is_malformed_expect_it_refused(member: str, value: Any) -> None:
     table = BlockPolytope.per_premise([0.0], [1.0]).to_document([[[1.0]], [[2.0]]])
     table[member] = value
-    with pytest.raises(ValueError, match=r"\w"):
-        VertexTable.parse(table)
+    with pytest.raises(InputError, match="table: "):
+        vertex_table(table)

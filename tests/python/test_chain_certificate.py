@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from quasilpv.certificate.chain import ChainForm, ChainJoint, ChainProof, bernstein, prove_chain
-from quasilpv.certificate.exact_matrices import matrix, rational
-from quasilpv.certificate.gate_rationals import to_floats
+from quasilpv.certificate.exact.chain import ChainForm, ChainJoint, ChainProof, bernstein, prove_chain
+from quasilpv.certificate.exact.matrices import matrix, rational
+from quasilpv.certificate.exact.rationals import to_floats
 from quasilpv.synthesis.chain_storages import InertiaPairing, Side, Storages, find_storages
 from quasilpv.systems.robots.tree import JointKind, KinematicTree
 from reference.random_trees import coordinates, random_body, random_tree

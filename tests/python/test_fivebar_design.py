@@ -17,10 +17,8 @@ from hypothesis import strategies as st
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
 from quasilpv.certificate import verify
-from quasilpv.certificate.exact_matrices import rational
-from quasilpv.certificate.gate import robust_gate
-from quasilpv.certificate.gate_data import loop_data
-from quasilpv.certificate.gate_margin import inertia_margin
+from quasilpv.certificate.exact.matrices import rational
+from quasilpv.certificate.gate.margin import inertia_margin
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.loops.frozen_loop import FrozenLoop
@@ -30,6 +28,7 @@ from quasilpv.scenarios import tracking_experiment
 from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.fivebar import RhombicFiveBar
 from quasilpv.systems.robots.registry import robot
+from reference.checked import loop_data, robust_gate
 from reference.five_bar_run import sines, track
 from reference.gated_arms import artifact_document, full_map, multiple_pole_loop
 

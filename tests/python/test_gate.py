@@ -16,13 +16,13 @@ from flint import fmpq, fmpq_poly
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from quasilpv.certificate.exact_matrices import rational
-from quasilpv.certificate.gate import growth_rates
-from quasilpv.certificate.gate_delay import DelayMargin, StabilityRectangle, delay_margin
-from quasilpv.certificate.gate_loop import AccelerationLoopData, CharacteristicPolynomial, Controller
-from quasilpv.certificate.gate_margin import InertiaMargin, inertia_margin
-from quasilpv.certificate.gate_polynomials import CircleProduct, critical_values, is_schur, roots_between
-from quasilpv.certificate.gate_rationals import float_at_least, float_at_most, to_float
+from quasilpv.certificate.exact.matrices import rational
+from quasilpv.certificate.exact.polynomials import CircleProduct, critical_values, is_schur, roots_between
+from quasilpv.certificate.exact.rationals import float_at_least, float_at_most, to_float
+from quasilpv.certificate.gate.delay import DelayMargin, StabilityRectangle, delay_margin
+from quasilpv.certificate.gate.loop import AccelerationLoopData, CharacteristicPolynomial, Controller
+from quasilpv.certificate.gate.margin import InertiaMargin, inertia_margin
+from quasilpv.certificate.gate.proof import growth_rates
 from quasilpv.errors import InputError
 from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw, SampledLoop
 from quasilpv.systems.robots.registry import robot

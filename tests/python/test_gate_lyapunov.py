@@ -15,13 +15,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quasilpv.arrays import FloatArray
-from quasilpv.certificate.exact_matrices import matrix, rational
-from quasilpv.certificate.gate import robust_gate
-from quasilpv.certificate.gate_data import loop_data
-from quasilpv.certificate.gate_loop import AccelerationLoopData
-from quasilpv.certificate.gate_lyapunov import LyapunovClaim, SampledSignals, is_function_proved
-from quasilpv.certificate.gate_motion import InertiaDisc
-from quasilpv.certificate.gate_rationals import to_floats
+from quasilpv.certificate.exact.matrices import matrix, rational
+from quasilpv.certificate.exact.rationals import to_floats
+from quasilpv.certificate.gate.loop import AccelerationLoopData
+from quasilpv.certificate.gate.lyapunov import LyapunovClaim, SampledSignals
+from quasilpv.certificate.gate.motion import InertiaDisc, LyapunovDocument
+from quasilpv.certificate.laws.dob_acceleration import LyapunovBound
+from quasilpv.documents.strict_model import validate
 from quasilpv.errors import ClaimError, InputError
 from quasilpv.release import checked_artifact, to_artifact
 from quasilpv.synthesis import DesignRequest, synthesise
@@ -29,6 +29,7 @@ from quasilpv.synthesis.acceleration import moving_inertia as design
 from quasilpv.synthesis.acceleration.moving_lyapunov import delayed_loop, known_signals, moving_lyapunov
 from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw
 from quasilpv.systems.robots.registry import robot
+from reference.checked import is_function_proved, loop_data, robust_gate
 from reference.gated_arms import full_map, moving_design, moving_five_bar, multiple_pole_loop, quotients
 
 Document = dict[str, Any]
@@ -145,7 +146,8 @@ def test_when_a_function_is_found_for_a_loop_expect_the_gate_to_prove_it(
     loop = multiple_pole_loop(wc, wo, 1e-3, 1e-3)
     found = moving_lyapunov(as_law(loop), design.InertiaDisc(centre, 0.1 * centre, np.eye(2)), delay)
     assert found is not None
-    claim = LyapunovClaim.of(found.to_document(), found.bound_document(), 2)
+    function = validate(LyapunovDocument, found.to_document(), "function")
+    claim = LyapunovClaim.of(function, validate(LyapunovBound, found.bound_document(), "bound"), 2)
     disc = InertiaDisc(rational(centre), rational(0.1 * centre), matrix(np.eye(2).tolist()))
     assert claim.is_proved(loop, disc, rational(delay))
 
@@ -262,7 +264,7 @@ MUTANTS: dict[str, Callable[[Document, Document], None]] = {
 @pytest.mark.parametrize("mutant", MUTANTS)
 def test_when_the_function_or_its_bound_is_not_true_expect_it_refused(mutant: str) -> None:
     document = changed(moving_five_bar(), MUTANTS[mutant])
-    assert not is_function_proved(document, loop_data(document))
+    assert not is_function_proved(document)
 
 
 def test_when_the_function_is_refused_expect_the_gate_not_passed() -> None:
@@ -300,4 +302,4 @@ def test_when_an_artifact_carries_no_function_expect_the_lemma_to_do() -> None:
 def test_when_the_function_is_malformed_expect_one_line(change: Any, field: str) -> None:
     document = changed(moving_five_bar(), change)
     with pytest.raises(InputError, match=f"{field}: got another matrix, expected symmetric"):
-        is_function_proved(document, loop_data(document))
+        is_function_proved(document)

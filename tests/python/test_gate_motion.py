@@ -12,19 +12,18 @@ from flint import fmpq, fmpq_mat
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from quasilpv.certificate.cosine_matrices import CosineMatrix
-from quasilpv.certificate.exact_matrices import matrix, rational, zero
-from quasilpv.certificate.gate import robust_gate
-from quasilpv.certificate.gate_data import inertia_data, loop_data
-from quasilpv.certificate.gate_loop import CharacteristicPolynomial, Controller
-from quasilpv.certificate.gate_motion import InertiaDisc, satisfies_circle_criterion
-from quasilpv.certificate.gate_range import InertiaPair
-from quasilpv.certificate.gate_rationals import to_float
+from quasilpv.certificate.exact.cosine_matrices import CosineMatrix
+from quasilpv.certificate.exact.matrices import matrix, rational, zero
+from quasilpv.certificate.exact.rationals import to_float
+from quasilpv.certificate.gate.loop import CharacteristicPolynomial, Controller
+from quasilpv.certificate.gate.motion import InertiaDisc, satisfies_circle_criterion
+from quasilpv.certificate.robot.range import InertiaPair
 from quasilpv.errors import InputError
 from quasilpv.release import to_artifact
 from quasilpv.synthesis import DesignRequest, Specification, synthesise
 from quasilpv.synthesis.acceleration.moving_inertia import needed_disc
 from quasilpv.systems.robots.registry import robot
+from reference.checked import inertia_data, loop_data, robust_gate
 from reference.gated_arms import artifact_document, full_map, moving_five_bar, multiple_pole_loop, quotients
 
 LOOP = multiple_pole_loop(60, 1200, 1e-3, 1e-3)

@@ -18,22 +18,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quasilpv.artifact import Artifact, write_artifact
-from quasilpv.certificate.exact_matrices import rational
-from quasilpv.certificate.gate import RobustGate, margin_curve, robust_gate
-from quasilpv.certificate.gate_cells import Cells, Pencil, are_positive_definite, cosine_enclosure
-from quasilpv.certificate.gate_data import cosine_pairs, inertia_data, loop_data
-from quasilpv.certificate.gate_inertia import design_inertia, true_inertia
-from quasilpv.certificate.gate_mechanism import LinkData, SerialArmData
-from quasilpv.certificate.gate_range import InertiaPair, NeededRange, needed_range
-from quasilpv.certificate.gate_rationals import to_float, to_floats
+from quasilpv.certificate.exact.cells import Cells, Pencil, are_positive_definite, cosine_enclosure
+from quasilpv.certificate.exact.matrices import rational
+from quasilpv.certificate.exact.rationals import to_float, to_floats
+from quasilpv.certificate.gate.proof import RobustGate, margin_curve
+from quasilpv.certificate.robot.data import cosine_pairs
+from quasilpv.certificate.robot.inertia import design_inertia, true_inertia
+from quasilpv.certificate.robot.range import InertiaPair, NeededRange, needed_range
+from quasilpv.certificate.robot.serial_arm import SerialArmData
 from quasilpv.cli import run
+from quasilpv.documents.mechanism import LinkParameters, SerialArm
 from quasilpv.errors import InputError
 from quasilpv.figures.margins import margin_figure
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.systems.robots.registry import Robot, robot
+from reference.artifacts import arm3_document
+from reference.checked import inertia_data, loop_data, robust_gate
 from reference.gated_arms import arm4, artifact_document, growth_rate, multiple_pole_loop
 
-LINK = LinkData(length_m=1.0, mass_kg=1.0, com_m=0.5, inertia_kg_m2=0.5)
+LINK = LinkParameters(length_m=1.0, mass_kg=1.0, com_m=0.5, inertia_kg_m2=0.5, friction_nm_s=0.0)
+FOUR_LINKS = SerialArmData(SerialArm(gravity_m_s2=9.81, equilibrium="hanging", links=(LINK,) * 4))
 LOOP = multiple_pole_loop(60, 1200, 1e-3, 1e-3)
 SCALE = 1.2
 ANSWER = {
@@ -265,7 +269,7 @@ def test_when_the_design_inertia_is_indefinite_in_a_posture_expect_no_range_and_
     ],
 )
 def test_when_premises_are_cosines_of_sums_expect_their_pairs(code: list[Any], pairs: tuple[Any, ...]) -> None:
-    assert cosine_pairs(code, SerialArmData((LINK,) * 4).absolute_map) == pairs
+    assert cosine_pairs(code, FOUR_LINKS.absolute_map) == pairs
 
 
 @pytest.mark.parametrize(
@@ -283,12 +287,11 @@ def test_when_premises_are_cosines_of_sums_expect_their_pairs(code: list[Any], p
 )
 def test_when_a_premise_is_no_cosine_of_neighbouring_angles_expect_it_refused(code: list[Any]) -> None:
     with pytest.raises(InputError, match=r"programs\.premises"):
-        cosine_pairs(code, SerialArmData((LINK,) * 4).absolute_map)
+        cosine_pairs(code, FOUR_LINKS.absolute_map)
 
 
 Change = Callable[[dict[str, Any]], object]
 DAMAGES: dict[str, tuple[Change, str]] = {
-    "another law": (lambda d: d["law"].update(kind="pid"), r"law\.kind"),
     "another robot": (lambda d: d["robot"]["parameters"].pop("links"), "links"),
     "another payload rule": (lambda d: d["payloads"].update(inertia_about_com="scaled"), "inertia_about_com"),
     "fractions beyond 1": (lambda d: d["payloads"].update(fraction=[0, 2]), "fraction"),
@@ -309,6 +312,11 @@ def test_when_an_artifact_does_not_fit_the_gate_expect_the_field_named(damage: s
     change(content)
     with pytest.raises(InputError, match=field):
         robust_gate(content)
+
+
+def test_when_a_law_has_no_gate_expect_those_that_have_one() -> None:
+    with pytest.raises(InputError, match=r"law\.kind: got pid, expected one with this gate: dob-acceleration, dob-tor"):
+        robust_gate(arm3_document("pid"))
 
 
 # ---- the gate --------------------------------------------------------------------------------------------------------

@@ -16,8 +16,7 @@ from flint import fmpq
 from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact, write_artifact
 from quasilpv.certificate import gate
-from quasilpv.certificate.grid_gate import GridGate, frozen_torque_law, grid_gate, growth_curves
-from quasilpv.certificate.vertex_tables import VertexTable
+from quasilpv.certificate.gate.grid import GridGate, growth_curves
 from quasilpv.cli import run
 from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.errors import InputError
@@ -26,6 +25,7 @@ from quasilpv.polytopes import BlockPolytope
 from quasilpv.release import release
 from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
+from reference.checked import frozen_torque_law, grid_gate, vertex_table
 from reference.step import DobTorque, OutputStage, Sample
 
 Document = dict[str, Any]
@@ -158,7 +158,7 @@ def test_when_a_table_is_evaluated_expect_the_polytope_of_the_design_and_clampin
     rng = np.random.default_rng(3)
     polytope = BlockPolytope.grouped([-1.0, 0.0, 2.0], [1.0, 0.5, 3.0], partition)
     vertices = rng.normal(size=(sum(2 ** len(block) for block in partition), 2, 3))
-    table = VertexTable.parse(polytope.to_document(vertices))
+    table = vertex_table(polytope.to_document(vertices))
     points = rng.uniform([-1.5, -0.2, 1.5], [1.5, 0.7, 3.5], size=(50, 3))
     weights = polytope.weights(polytope.saturate(points)[0])
     np.testing.assert_allclose(table.evaluate(points), np.tensordot(weights, vertices, axes=1), atol=1e-12)

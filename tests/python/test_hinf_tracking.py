@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 
 from quasilpv.arrays import FloatArray
-from quasilpv.certificate import CHECKERS, gate, verify
-from quasilpv.certificate.grid_gate import frozen_hinf_law
-from quasilpv.certificate.hinf_law import unknown_terms
+from quasilpv.certificate import gate, verify
+from quasilpv.certificate import shipped as read_shipped
+from quasilpv.certificate.exact.matrices import rational
+from quasilpv.certificate.laws.hinf_tracking import unknown_terms
 from quasilpv.conditions.tracking.iii10 import tracking_condition
 from quasilpv.conditions.tracking.iii10_reduced import UnknownTorques, reduced_tracking_condition
 from quasilpv.documents.canonical import canonical_json, with_hash
@@ -30,6 +31,7 @@ from quasilpv.synthesis import DesignRequest, Specification, hinf
 from quasilpv.synthesis.hinf import friction_bound_nm_s, hinf_tracking, unknown_torques
 from quasilpv.synthesis.torque.schedule import full_schedule
 from quasilpv.systems.robots.registry import robot
+from reference.checked import frozen_hinf_law, inequalities
 from reference.mutants import BLOCKS, Mutant
 
 Document = dict[str, Any]
@@ -99,9 +101,8 @@ def test_when_states_and_payloads_are_drawn_expect_the_torque_as_a_sum_of_unknow
 def test_when_the_checker_bounds_the_unknown_terms_itself_expect_those_of_the_design() -> None:
     for robot_id in ("arm2", "arm3", "fivebar"):
         arm = robot(robot_id)
-        content = release(DesignRequest.of(robot_id, "pid")).artifact.content()
-        content["witness"] = {"feedback": {"friction_nm_s": friction_bound_nm_s(arm)}}
-        terms, unknown = unknown_terms(content), unknown_torques(arm)
+        content = release(robot_id, "pid").artifact.content()
+        terms, unknown = unknown_terms(read_shipped(content), rational(arm.friction_bound_nm_s)), unknown_torques(arm)
         assert len(terms) == len(unknown.radius)
         for k, term in enumerate(terms):
             assert float(term.radius.p) / float(term.radius.q) == pytest.approx(unknown.radius[k], rel=1e-14)
@@ -237,7 +238,7 @@ def shipped(module: Any) -> Document:
 
 
 def holds(document: Document) -> bool:
-    return all(claim.holds for claim in CHECKERS["hinf-tracking"][0](document))
+    return all(claim.holds for claim in inequalities(document))
 
 
 def test_when_the_builder_is_right_expect_the_checker_to_agree() -> None:

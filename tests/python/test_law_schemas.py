@@ -7,8 +7,7 @@ from typing import Any, get_args, get_type_hints
 import pytest
 
 from quasilpv import _runtime
-from quasilpv.artifact.laws import Law
-from quasilpv.artifact.schema import REQUIRED_PROGRAMS
+from quasilpv.certificate import LAWS
 from quasilpv.documents.design_inertia import DesignInertia
 from quasilpv.documents.strict_model import NonNegative, Number, Positive, StrictModel
 from quasilpv.documents.tables import Matrix, PolytopeTable, Vector
@@ -64,12 +63,7 @@ def nested(hint: Any) -> Members:
     return members_of(plain) if is_object else {}
 
 
-def kind_of(model: type[StrictModel]) -> str:
-    (kind,) = get_args(model.model_fields["kind"].annotation)
-    return str(kind)
-
-
-MODELS = {kind_of(model): model for model in get_args(get_args(Law)[0])}
+MODELS = {kind: law.document for kind, law in LAWS.items()}
 RUNTIME = _runtime.law_schemas()
 
 
@@ -85,7 +79,7 @@ def test_both_sides_know_the_same_members_of_a_law_and_their_types(kind: str) ->
 
 @pytest.mark.parametrize("kind", MODELS)
 def test_both_sides_know_the_same_programs_of_a_law(kind: str) -> None:
-    assert set(RUNTIME[kind][1]) == set(REQUIRED_PROGRAMS[kind])
+    assert set(RUNTIME[kind][1]) == set(MODELS[kind].PROGRAMS)
 
 
 @pytest.mark.parametrize("kind", RUNTIME)

@@ -16,14 +16,14 @@ from hypothesis import strategies as st
 
 from quasilpv.arrays import FloatArray
 from quasilpv.certificate import verify
-from quasilpv.certificate.gate_data import loop_data
-from quasilpv.certificate.sampled_envelope import ErrorDynamics
+from quasilpv.certificate.laws.sampled_envelope import ErrorDynamics
 from quasilpv.conditions.tracking.sampled_errors import SampledErrors, sampled_errors
 from quasilpv.errors import InputError
 from quasilpv.release import release
 from quasilpv.synthesis import DesignRequest
 from quasilpv.synthesis.acceleration.envelope import acceleration_envelope
 from quasilpv.systems.robots.registry import robot
+from reference.checked import loop_data
 
 Document = dict[str, Any]
 SAMPLES = 4000

@@ -16,8 +16,9 @@ from quasilpv import _runtime
 from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact, evaluate
 from quasilpv.certificate import gate, verify
-from quasilpv.certificate.robot_dynamics import gravity_stiffness, robot_dynamics
+from quasilpv.certificate.robot.registry import numeric_robot
 from quasilpv.documents.canonical import canonical_json
+from quasilpv.documents.robot import read_mechanism, read_payloads
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.loops.frozen_loop import FrozenLoop
 from quasilpv.loops.state_law import StateLaw
@@ -263,16 +264,20 @@ def test_when_a_plant_has_stiffness_expect_the_sampled_loop_of_the_matrix_expone
     assert free.growth_rates()[0] == pytest.approx(unstable, rel=1e-9)
 
 
-@pytest.mark.parametrize("robot_id", ["arm2", "arm2-upright", "arm3-light", "spring-disc"])
+@pytest.mark.parametrize("robot_id", ["arm2", "arm2-upright", "arm3-light", "fivebar", "spring-disc"])
 def test_when_the_checker_rebuilds_a_robot_expect_the_dynamics_of_the_model(robot_id: str) -> None:
     entry = robot(robot_id)
     rng = np.random.default_rng(3)
     theta, omega = rng.uniform(-3, 3, (2, 20, entry.model.joints))
     parameters = entry.model.parameters_document()
-    inertia, torque, _ = robot_dynamics(parameters, theta, omega)
+    mechanism = read_mechanism(parameters)
+    dynamics = numeric_robot(mechanism)
+    motion = dynamics.motion(theta, omega)
+    inertia, torque = motion.inertia, motion.torque
     loaded = entry.with_payload_fraction(0.7)
-    documents = {"robot": {"parameters": parameters}, "payloads": entry.payloads.to_document()}
-    stiffness = gravity_stiffness(documents, theta, 0.7)
+    scales = read_payloads(entry.payloads.to_document(), mechanism).scales
+    loads = [[1.0 + 0.7 * (scale - 1.0) for scale in factors] for factors in scales]
+    stiffness = dynamics.stiffness(*loads, theta)
     for k in range(20):
         np.testing.assert_allclose(inertia[k], entry.model.inertia(theta[k]), rtol=1e-12, atol=1e-12)
         expected = entry.model.coriolis(theta[k], omega[k]) + entry.model.gravity(theta[k])

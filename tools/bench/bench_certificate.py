@@ -13,8 +13,9 @@ import sympy
 from bench_report import REPETITIONS, ROOT, DisagreementError, Report, main, row
 from flint import fmpq_mat
 
-from quasilpv.certificate import claims, verify
-from quasilpv.certificate.exact_matrices import is_positive_definite
+from quasilpv.certificate import verify
+from quasilpv.certificate.exact import claims
+from quasilpv.certificate.exact.matrices import is_positive_definite
 from quasilpv.experiments.designs import kept_design
 from quasilpv.synthesis import DEFAULT_CONTROLLER, DesignRequest, Specification
 

@@ -16,7 +16,7 @@ from flint import fmpq
 from quasilpv import __version__
 from quasilpv.artifact import Artifact, Program
 from quasilpv.artifact.compilation import compile_program
-from quasilpv.certificate import CHECKERS, Evidence, gate, verify
+from quasilpv.certificate import LAWS, Evidence, gate, verify
 from quasilpv.documents.canonical import document_hash
 from quasilpv.documents.robot import ARTIFACT_VERSION
 from quasilpv.errors import ClaimError
@@ -29,9 +29,6 @@ from quasilpv.systems.robots.registry import Robot
 
 NEEDED_OF_CLAIMS = Evidence.ENCLOSED
 """Every claim of a released artifact is proved; a sampled one does not suffice."""
-
-NEEDED_OF_GATE: Mapping[str, Evidence] = {"dob-acceleration": Evidence.ENCLOSED}
-"""What the robust gate of a law kind has to rest on; for kinds without an entry a grid suffices, and is called one."""
 
 VERIFICATION_VERSION = 2
 """Of the member ``verification``; 1, which had no number, did not tell kinds of evidence apart."""
@@ -89,29 +86,29 @@ def checked_artifact(
         ClaimError: a claim does not hold or is not proved, the robust gate is not passed, or torque or slew limits
             cannot deliver what the design needs.
     """
-    content = to_artifact(design).content()
+    artifact = to_artifact(design)
+    content, law = artifact.content(), LAWS[artifact.law.kind]
     failures = list(unmet_demands(design, motions_of))
-    if design.law["kind"] not in CHECKERS:
+    if not law.checks:
         _refuse(content["name"], failures, allow_unverified)
         return Artifact.from_document({**content, **_released_unverified(failures, content["verification"])})
-    verdict = verify(content, content["name"])
+    verdict = verify(artifact, artifact.name)
     samples = float(design.inputs["specification"]["delay_samples"])
-    found = gate(content, content["name"], fmpq(*samples.as_integer_ratio())).to_document()
-    of_gate = NEEDED_OF_GATE.get(design.law["kind"], Evidence.SAMPLED)
+    found = gate(artifact, artifact.name, fmpq(*samples.as_integer_ratio()))
     failures += [f"{claim.name}: does not hold ({claim.evidence})" for claim in verdict.claims if not claim.holds]
     for claim in verdict.weaker_than(NEEDED_OF_CLAIMS):
         failures.append(f"{claim.name}: {claim.evidence}, {NEEDED_OF_CLAIMS} evidence is needed")
-    if not found["passed"]:
-        failures.append(_why_not_passed(found))
-    elif not Evidence(found["evidence"]).is_at_least(of_gate):
-        failures.append(f"robust gate: {found['evidence']}, {of_gate} evidence is needed")
+    if not found.passed:
+        failures.append(found.why_not_passed())
+    elif not found.evidence.is_at_least(law.gate_evidence):
+        failures.append(f"robust gate: {found.evidence}, {law.gate_evidence} evidence is needed")
     _refuse(content["name"], failures, allow_unverified)
     evidence = {
         **(content["verification"] or {}),
         "schema_version": VERIFICATION_VERSION,
-        "needed_evidence": {"claims": NEEDED_OF_CLAIMS.value, "gate": of_gate.value},
+        "needed_evidence": {"claims": NEEDED_OF_CLAIMS.value, "gate": law.gate_evidence.value},
         "certificate": verdict.findings(),
-        "gate": found,
+        "gate": found.to_document(),
     }
     return Artifact.from_document({**content, "verification": evidence, **_released_unverified(failures, evidence)})
 
@@ -126,18 +123,6 @@ def _refuse(name: str, failures: Sequence[str], allow_unverified: bool) -> None:
 def _released_unverified(failures: Sequence[str], evidence: Mapping[str, Any] | None) -> dict[str, Any]:
     """The member `verification` of an artifact that is released in spite of failures; nothing without any."""
     return {"verification": {**(evidence or {}), "released_unverified": True}} if failures else {}
-
-
-def _why_not_passed(found: Mapping[str, Any]) -> str:
-    """Half a line: what the gate wanted and what it found."""
-    if found.get("proved_in_motion") is False:
-        return "robust gate: one Lyapunov function for all motions is claimed, but not proved"
-    rate, needed, margin = (found[name] for name in ("worst_growth_rate_per_s", "needed_range", "inertia_margin"))
-    if needed and margin and "grid" not in found:
-        (a, b), (low, high) = needed, margin
-        upper = "infinity" if high is None else f"{high:.4g}"
-        return f"robust gate: needed range [{a:.4g}, {b:.4g}] not proved inside the inertia margin [{low:.4g}, {upper}]"
-    return "robust gate: not passed" + ("" if rate is None else f", worst growth rate {rate:.3g} 1/s")
 
 
 def design_inputs(robot_model: Robot, inputs: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import sympy as sp
 
 from quasilpv.artifact import Artifact
 from quasilpv.artifact.compilation import compile_program
-from quasilpv.artifact.schema import REQUIRED_PROGRAMS
+from quasilpv.certificate import LAWS as LAW_KINDS
 from quasilpv.errors import InputError
 from quasilpv.polytopes import BlockPolytope
 from quasilpv.systems.robots.registry import robot
@@ -116,7 +116,7 @@ def arm3_document(kind: str = "dob-acceleration") -> dict[str, Any]:
         "payloads": arm3.payloads.to_document(),
         "domain": arm3.domain.to_document(),
         "limits": arm3.limits.to_document(),
-        "programs": {name: ARM3_PROGRAMS[name] for name in REQUIRED_PROGRAMS[kind]},
+        "programs": {name: ARM3_PROGRAMS[name] for name in LAW_KINDS[kind].document.PROGRAMS},
         "law": law,
         "witness": {"condition": "chain-lmi", "P": [[1.5, 0.25], [0.25, 2.0]]},
         "verification": {"gate": {"margin": 0.03}},

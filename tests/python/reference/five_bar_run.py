@@ -12,9 +12,9 @@ import numpy as np
 
 from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact, evaluate
-from quasilpv.certificate.vertex_tables import VertexTable
 from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
 from quasilpv.trajectories import Trajectory
+from reference.checked import vertex_table
 from reference.step import (
     ComputedTorque,
     DobAcceleration,
@@ -45,7 +45,7 @@ def shipped_law(artifact: Artifact) -> Law:
         return evaluate(programs["gravity"], angle)
 
     def table(name: str) -> Callable[[FloatArray], FloatArray]:
-        vertices = VertexTable.parse(law[name])
+        vertices = vertex_table(law[name])
         return lambda angle: vertices.evaluate(evaluate(programs["premises"], angle)[None])[0]
 
     def speed_torque(name: str) -> Callable[..., FloatArray]:

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from quasilpv.arrays import FloatArray
-from quasilpv.certificate.gate_data import loop_data
-from quasilpv.certificate.gate_loop import AccelerationLoopData
+from quasilpv.certificate.gate.loop import AccelerationLoopData
 from quasilpv.release import to_artifact
 from quasilpv.synthesis import DesignRequest, Specification, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.robots.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
 from quasilpv.systems.robots.arms import PlanarSerialArm
 from quasilpv.systems.robots.registry import Robot
+from reference.checked import loop_data
 
 
 def multiple_pole_loop(wc: float, wo: float, filter_s: float, T: float) -> AccelerationLoopData:

@@ -31,6 +31,8 @@ def chain_document(feedback: ChainGains, observer: ChainGains) -> dict[str, Any]
             "kind": "dob-acceleration",
             "feedback": {"kp": kp, "kd": kd, "ki": ki},
             "observer": observer.gains.tolist(),
+            "filter_time_constant_s": 1e-3,
+            "disturbance_compensation": True,
             "inertia": POLYTOPE.to_document(INERTIA),
         },
         "witness": {
@@ -52,6 +54,7 @@ def torque_document(feedback: FeedbackPoint, observer: ObserverPoint) -> dict[st
             "kind": "dob-torque",
             "feedback": POLYTOPE.to_document(feedback.gains),
             "observer": POLYTOPE.to_document(observer.gains),
+            "filter_time_constant_s": 1e-3,
             "inertia": POLYTOPE.to_document(INERTIA),
         },
         "witness": {

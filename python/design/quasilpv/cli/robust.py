@@ -14,8 +14,8 @@ from quasilpv.files import claim_folder
 
 if TYPE_CHECKING:
     from quasilpv.certificate import Gate
-    from quasilpv.certificate.gate import RobustGate
-    from quasilpv.certificate.grid_gate import GridGate
+    from quasilpv.certificate.gate.grid import GridGate
+    from quasilpv.certificate.gate.proof import RobustGate
 
 MARGIN_FIGURE, GROWTH_FIGURE = "inertia-margin", "growth-rate"
 WHILE = "while no torque or slew limit acts"
@@ -42,7 +42,7 @@ def robust_command(
     """
     from quasilpv.artifact import read_artifact
     from quasilpv.certificate import gate
-    from quasilpv.certificate.gate import RobustGate
+    from quasilpv.certificate.gate.proof import RobustGate
 
     formats = formats_of(figure_formats)
     if out is not None:
@@ -62,7 +62,7 @@ def robust_command(
 
 def _draw(found: Gate, out: Path, formats: Sequence[str]) -> list[Path]:
     """The figure of either gate."""
-    from quasilpv.certificate.grid_gate import GridGate
+    from quasilpv.certificate.gate.grid import GridGate
     from quasilpv.figures.gate import gate_figure
     from quasilpv.figures.style import save
 
@@ -94,7 +94,7 @@ def _grid_answer(found: GridGate) -> tuple[list[tuple[str, str]], str]:
 
 def _rows(gate: RobustGate) -> list[tuple[str, str]]:
     """What a person wants to know, one line each."""
-    from quasilpv.certificate.gate_rationals import to_float
+    from quasilpv.certificate.exact.rationals import to_float
 
     margin = _interval(*gate.margin.to_floats()) if gate.margin else "none"
     needed = _interval(*gate.needed.to_floats()) if gate.needed else "none"

@@ -124,4 +124,4 @@ def _mechanism(controller: Artifact, scenario: Path | None) -> PlanarMechanism:
 
 
 def _disturbance_unit(controller: Artifact) -> str:
-    return "rad/s²" if controller.law.kind == "dob-acceleration" else "N m"
+    return "rad/s²" if controller.law.DISTURBANCE == "acceleration" else "N m"

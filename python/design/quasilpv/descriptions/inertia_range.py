@@ -2,7 +2,7 @@
 
     c1 M_n(q) < M_t(q) < c2 M_n(q)    for every q in the limits of the joints and every true robot
 
-with one chain certificate (`quasilpv.certificate.chain`) for each side.
+with one chain certificate (`quasilpv.certificate.exact.chain`) for each side.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from quasilpv.arrays import FloatArray
-from quasilpv.certificate.chain import ChainForm, ChainJoint, prove_chain
-from quasilpv.certificate.exact_matrices import matrix, rational
+from quasilpv.certificate.exact.chain import ChainForm, ChainJoint, prove_chain
+from quasilpv.certificate.exact.matrices import matrix, rational
 from quasilpv.descriptions.spatial_robot import SpatialRobot
 from quasilpv.synthesis.chain_storages import InertiaPairing, Side, find_storages
 from quasilpv.systems.robots.tree import KinematicTree

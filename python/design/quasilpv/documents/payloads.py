@@ -21,6 +21,15 @@ class PayloadsDocument(StrictModel):
     def require_joints(self, joints: int) -> None:
         """Raise ``FieldError`` unless there is one entry for each joint where there has to be."""
 
+    @property
+    def scales(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Factors of masses (of a disc, of its moment of inertia) and of distances to centres of mass at fraction 1.
+
+        Raises:
+            TypeError: the plants are not on one line.
+        """
+        raise TypeError(f"{type(self).__name__} is no set of plants along one line")
+
 
 class _Fractions(PayloadsDocument):
     """Plants along one line: fraction 0 is the nominal robot, 1 the full payload."""
@@ -41,6 +50,11 @@ class LinkPayloads(_Fractions):
     com_scale: tuple[float, ...]
     inertia_about_com: Literal["unchanged"]
 
+    @property
+    def scales(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """See `PayloadsDocument.scales`."""
+        return self.mass_scale, self.com_scale
+
     def require_joints(self, joints: int) -> None:
         """See `PayloadsDocument.require_joints`."""
         for field in ("mass_scale", "com_scale"):
@@ -52,6 +66,11 @@ class DiscPayloads(_Fractions):
     """Factor of the moment of inertia of a disc at fraction 1."""
 
     inertia_scale: float
+
+    @property
+    def scales(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """See `PayloadsDocument.scales`."""
+        return (self.inertia_scale,), (1.0,)
 
 
 class Load(StrictModel):

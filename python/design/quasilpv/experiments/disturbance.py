@@ -18,9 +18,8 @@ from quasilpv.experiments.run import Run
 def true_disturbance(run: Run, artifact: Artifact, runtime: _runtime.Artifact) -> Disturbance | None:
     """The disturbance that the law's estimate should equal, or ``None`` if it estimates none.
 
-    * ``dob-acceleration``: ``a_d = theta'' - M_n(z)^-1 (Gamma - G(theta))``, rad/s^2;
-    * ``dob-torque``: ``d = M_n(z) theta'' + G(theta) - Gamma``, N m;
-    * ``ctc-dob``: ``d = M_n(z) theta'' + N(theta, w) w + G(theta) - Gamma``, N m;
+    * an acceleration: ``a_d = theta'' - M_n(z)^-1 (Gamma - G(theta))``, rad/s^2;
+    * a torque: ``d = M_n(z) theta'' + G(theta) - Gamma``, N m, and ``N(theta, w) w`` more if the law knows it;
 
     with the design model of the artifact at the true angles and speeds.
 
@@ -29,8 +28,8 @@ def true_disturbance(run: Run, artifact: Artifact, runtime: _runtime.Artifact) -
         artifact: the controller.
         runtime: the same as the run-time side loaded it.
     """
-    kind = artifact.law.kind
-    if kind not in ("dob-acceleration", "dob-torque", "ctc-dob"):
+    level = artifact.law.DISTURBANCE
+    if level is None:
         return None
     angle, speed = run.true_angle_rad.T, run.true_speed_rad_s.T
     gravity = evaluate(artifact.programs["gravity"], angle).T
@@ -38,10 +37,10 @@ def true_disturbance(run: Run, artifact: Artifact, runtime: _runtime.Artifact) -
     inertia = np.array([runtime.inertia(z) for z in premise])
     torque = np.vstack([np.zeros(run.joints), run.torque_nm[:-1]])
     acceleration = run.true_acceleration_rad_s2
-    if kind == "dob-acceleration":
+    if level == "acceleration":
         known = np.linalg.solve(inertia, (torque - gravity)[..., None])[..., 0]
         return Disturbance(acceleration - known, "rad/s²", "acceleration")
     unknown: FloatArray = np.einsum("kij,kj->ki", inertia, acceleration) + gravity - torque
-    if kind == "ctc-dob":
+    if "coriolis" in artifact.programs:
         unknown = unknown + evaluate(artifact.programs["coriolis"], angle, speed).T
     return Disturbance(unknown, "N m", "torque")

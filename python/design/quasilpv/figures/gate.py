@@ -6,8 +6,8 @@ from flint import fmpq
 from matplotlib.figure import Figure
 
 from quasilpv.certificate import Gate
-from quasilpv.certificate.gate import RobustGate, margin_curve
-from quasilpv.certificate.grid_gate import GridGate, growth_curves
+from quasilpv.certificate.gate.grid import GridGate, growth_curves
+from quasilpv.certificate.gate.proof import RobustGate, margin_curve
 from quasilpv.figures.growth import growth_figure
 from quasilpv.figures.margins import margin_figure
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from quasilpv.certificate.grid_gate import GridGate, GrowthCurve
+from quasilpv.certificate.gate.grid import GridGate, GrowthCurve
 from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, new_figure, style
 
 _COLOURS = (GREEN, BLUE, VERMILION)

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import ArrayLike
 
-from quasilpv.certificate.gate import MarginCurve, RobustGate
-from quasilpv.certificate.gate_rationals import to_float
+from quasilpv.certificate.exact.rationals import to_float
+from quasilpv.certificate.gate.proof import MarginCurve, RobustGate
 from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, new_figure, style
 
 _TICKS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)

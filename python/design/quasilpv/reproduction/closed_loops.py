@@ -15,7 +15,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from quasilpv.artifact import Artifact
-from quasilpv.artifact.laws import DobTorqueLaw
+from quasilpv.certificate.laws.dob_acceleration import DobAccelerationLaw
+from quasilpv.certificate.laws.dob_torque import DobTorqueLaw
 from quasilpv.experiments.designs import kept_design
 from quasilpv.experiments.metrics import Metrics
 from quasilpv.experiments.result import TrackResult, Variant
@@ -164,7 +165,7 @@ def without_disturbance_states(artifact: Artifact) -> Artifact:
     """
     document = artifact.content()
     observer: Any = document["law"]["observer"]
-    if artifact.law.kind == "dob-acceleration":
+    if isinstance(artifact.law, DobAccelerationLaw):
         observer = [*observer[:2], 0.0, 0.0]
     else:
         kept = 2 * artifact.joints

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from quasilpv.arrays import FloatArray
+from quasilpv.certificate.laws.descriptor_feedback import DescriptorFeedbackLaw
 from quasilpv.figures.stabilisation import regulation_figure
 from quasilpv.reproduction import rules
 from quasilpv.reproduction.closed_loops import EXACT, ClosedLoop, Outcome, outcome
@@ -24,7 +25,7 @@ def lyapunov_along(closed_loop: Outcome) -> FloatArray:
     """
     artifact, run = closed_loop.artifact, closed_loop.result.run
     law = artifact.law
-    P = law.lyapunov if law.kind == "descriptor-feedback" else (artifact.witness or {})["feedback"]["P"]
+    P = law.lyapunov if isinstance(law, DescriptorFeedbackLaw) else (artifact.witness or {})["feedback"]["P"]
     x = np.concatenate([run.true_angle_rad, run.true_speed_rad_s], axis=1)
     return np.asarray(np.einsum("ki,ki->k", x, np.linalg.solve(np.asarray(P), x.T).T))
 

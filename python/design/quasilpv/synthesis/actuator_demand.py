@@ -18,15 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from quasilpv.arrays import FloatArray
+from quasilpv.certificate import LAWS
 from quasilpv.loops.loop_grid import configurations
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.registry import Robot
 
 PAYLOAD_FRACTIONS = (0.0, 0.5, 1.0)
 POSTURES = 200
-STABILISING = ("state-feedback", "descriptor-feedback", "delayed-feedback")
-"""Laws that hold the arm at theta = 0 only."""
-
 INCREMENT_FACTOR = 2.0
 """So many times the predicted rms increment must fit into the slew limit of a sample."""
 
@@ -77,7 +75,7 @@ def unmet_demands(design: TrackingDesign, motions_of: MotionsOf = no_motions) ->
     torque_limit = np.array(robot.limits.torque_nm)
     step_limit = np.array(robot.limits.slew_nm_per_s) * design.sample_period_s
     noise = INCREMENT_FACTOR * predicted_increments(design)
-    if design.law["kind"] not in STABILISING:
+    if not LAWS[design.law["kind"]].document.STABILISES:
         gravity = largest_gravity(robot)
         yield from _beyond("torque limit", "N m", torque_limit, gravity, "gravity in the operating domain")
     yield from _beyond("slew limit", "N m per sample", step_limit, noise, _NOISE)

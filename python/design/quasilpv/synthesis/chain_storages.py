@@ -1,7 +1,7 @@
 """Storages for the chain certificate: found by semidefinite programming on sampled coordinates, worth what the exact
 check says of them.
 
-The inequalities of `quasilpv.certificate.chain` are affine in the storages and in the bound c. So
+The inequalities of `quasilpv.certificate.exact.chain` are affine in the storages and in the bound c. So
 
 1. the best bound on a few coordinates per joint is a semidefinite program;
 2. with the bound relaxed by a little, the storages are chosen with the largest common margin;

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from quasilpv.arrays import FloatArray
+from quasilpv.certificate.laws.hinf_tracking import HinfTrackingLaw
 from quasilpv.conditions.tracking.iii10_reduced import TrackingPoint, UnknownTorques, reduced_tracking_condition
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.hinf_law import hinf_tracking_law
@@ -210,11 +211,11 @@ def _tracking_design(search: _Search, tables: HinfTables, loops: LoopGrid) -> Tr
     robot, specification, schedule, point = search.robot, search.specification, tables.schedule, tables.point
     polytope = schedule.polytope
     return TrackingDesign(
-        controller="hinf-tracking",
+        controller=HinfTrackingLaw.tag(),
         robot=robot,
         sample_period_s=specification.sample_period_s,
         law={
-            "kind": "hinf-tracking",
+            "kind": HinfTrackingLaw.tag(),
             "numerator": polytope.to_document(point.Y),
             "lyapunov": point.P.tolist(),
             "velocity_filter_time_constant_s": tables.filter_time_constant_s,
@@ -224,7 +225,7 @@ def _tracking_design(search: _Search, tables: HinfTables, loops: LoopGrid) -> Tr
             "premises": tuple(premise.expression for premise in schedule.premises),
             "gravity": tuple(robot.model.symbolic.gravity),
         },
-        inputs={"controller": "hinf-tracking", "specification": specification.to_document()},
+        inputs={"controller": HinfTrackingLaw.tag(), "specification": specification.to_document()},
         report=_report(search, tables, loops),
         witness={
             "feedback": {

@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.certificate.laws.dob_acceleration import DobAccelerationLaw
+from quasilpv.certificate.laws.dob_torque import DobTorqueLaw
 from quasilpv.conditions.tracking.iv11_reduced import feedback_condition, observer_condition
 from quasilpv.conditions.tracking.sampled_chains import feedback_problem, observer_problem
 from quasilpv.errors import InputError
@@ -79,6 +81,6 @@ def _vertices(table: Mapping[str, Any]) -> npt.NDArray[np.float64]:
 
 
 _HALVES: Mapping[str, Callable[[Mapping[str, Any]], dict[str, Problem]]] = {
-    "dob-acceleration": _sampled_chains,
-    "dob-torque": _torque_level,
+    DobAccelerationLaw.tag(): _sampled_chains,
+    DobTorqueLaw.tag(): _torque_level,
 }

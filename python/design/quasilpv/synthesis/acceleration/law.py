@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from quasilpv.certificate.laws.dob_acceleration import DobAccelerationLaw
 from quasilpv.conditions.tracking.sampled_chains import ChainGains
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.design import AccelerationDesign, design_acceleration_law
@@ -56,14 +57,14 @@ def acceleration_law_of(robot: Robot, specification: Specification, design: Acce
         design: scalars and evidence.
     """
     scalars, lyapunov = design.candidate.law, _lyapunov(design, specification)
-    controller = "dob-acceleration" if design.disc is None else "dob-moving"
+    controller = DobAccelerationLaw.tag() if design.disc is None else "dob-moving"
     kp, kd, ki = (float(gain) for gain in scalars.feedback)
     return TrackingDesign(
         controller=controller,
         robot=robot,
         sample_period_s=specification.sample_period_s,
         law={
-            "kind": "dob-acceleration",
+            "kind": DobAccelerationLaw.tag(),
             "feedback": {"kp": kp, "kd": kd, "ki": ki},
             "observer": [float(gain) for gain in scalars.observer],
             "filter_time_constant_s": scalars.filter_time_constant_s,

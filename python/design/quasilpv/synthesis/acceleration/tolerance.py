@@ -82,7 +82,7 @@ class MovingTolerance:
     """Postures and payloads that change from sample to sample: the circle criterion for the disc of ``M_t^-1 M_n``.
 
     Without delay and with the specified one, ``|1 - c L| > r |L|`` on the unit circle, L the loop transfer per unit mu;
-    the frozen loop must be stable as well. References: as for `quasilpv.certificate.gate_motion`.
+    the frozen loop must be stable as well. References: as for `quasilpv.certificate.gate.motion`.
 
     Attributes:
         frozen: the demand on every posture on its own.

@@ -17,6 +17,8 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
+from quasilpv.certificate.laws.ctc import CtcDobLaw, CtcLaw
+from quasilpv.certificate.laws.pid import PidLaw
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
@@ -112,7 +114,7 @@ def pid_design(robot: Robot, specification: Specification, tuning: Tuning) -> Tr
     per_joint = tuning.inertia_scale * stretched_inertia(robot, tuning.payload_fraction)
     gains = zip(("kp", "kd", "ki"), tuning.unit_gains(), strict=True)
     law = {
-        "kind": "pid",
+        "kind": PidLaw.tag(),
         **{name: (gain * per_joint).tolist() for name, gain in gains},
         "velocity_filter_time_constant_s": tuning.velocity_filter_time_constant_s,
         "inertia": inertia_table(robot),
@@ -125,7 +127,7 @@ def computed_torque_design(robot: Robot, specification: Specification, tuning: T
     symbolic = robot.model.symbolic
     gains = zip(("gp", "gd", "gi"), tuning.unit_gains(), strict=True)
     law = {
-        "kind": "ctc-dob" if tuning.observer_bandwidth_rad_s > 0.0 else "ctc",
+        "kind": (CtcDobLaw if tuning.observer_bandwidth_rad_s > 0.0 else CtcLaw).tag(),
         **{name: [gain] * robot.model.joints for name, gain in gains},
         "velocity_filter_time_constant_s": tuning.velocity_filter_time_constant_s,
         "disturbance_observer_bandwidth_rad_s": tuning.observer_bandwidth_rad_s,

@@ -18,6 +18,9 @@ from typing import Any
 import numpy as np
 
 from quasilpv.arrays import FloatArray, symmetric
+from quasilpv.certificate.laws.delayed_feedback import DelayedFeedbackLaw
+from quasilpv.certificate.laws.descriptor_feedback import DescriptorFeedbackLaw
+from quasilpv.certificate.laws.state_feedback import StateFeedbackLaw
 from quasilpv.conditions.choices import Form
 from quasilpv.conditions.condition import Options, Statement
 from quasilpv.conditions.theorems import i2, ii6
@@ -130,7 +133,7 @@ def solve_pdc(model: PolytopicModel, decay: float, rate: float) -> Candidate | N
     P = solved.lyapunov
     gains = np.linalg.solve(P, solved.numerators.swapaxes(1, 2)).swapaxes(1, 2)
     return Candidate(
-        law={"kind": "state-feedback", "gain": model.polytope.to_document(gains)},
+        law={"kind": StateFeedbackLaw.tag(), "gain": model.polytope.to_document(gains)},
         witness={"P": P.tolist()} | solved.witness("P21", "P22"),
         gain_limit=solved.solution.objective,
         gain=lambda weights, inertia: np.asarray(np.tensordot(weights, gains, axes=1)),
@@ -145,7 +148,7 @@ def solve_descriptor(model: PolytopicModel, decay: float, rate: float) -> Candid
         return None
     P, F = solved.lyapunov, solved.numerators
     return Candidate(
-        law={"kind": "descriptor-feedback", "numerator": model.polytope.to_document(F), "lyapunov": P.tolist()},
+        law={"kind": DescriptorFeedbackLaw.tag(), "numerator": model.polytope.to_document(F), "lyapunov": P.tolist()},
         witness=solved.witness("L", "R"),
         gain_limit=solved.solution.objective,
         gain=lambda weights, inertia: descriptor_gain(np.tensordot(weights, F, axes=1), inertia, P),
@@ -169,7 +172,7 @@ def solve_delayed(model: PolytopicModel, decay: float, rate: float) -> Candidate
         return descriptor_gain(numerator, inertia, np.tensordot(weights, P, axes=1))
 
     law = {
-        "kind": "delayed-feedback",
+        "kind": DelayedFeedbackLaw.tag(),
         "lyapunov": model.polytope.to_document(P),
         "numerators": numerators.tolist(),
         "descriptor": True,

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from quasilpv.arrays import FloatArray
+from quasilpv.certificate.laws.delayed_feedback import DelayedFeedbackLaw
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.loop_grid import PAYLOAD_FRACTIONS, LoopGrid, configurations
 from quasilpv.loops.state_law import StateLaw
@@ -230,7 +231,7 @@ def _design(
     system, polytope, T = model.system, model.polytope, specification.sample_period_s
     tables = {name: polytope.vertices(X.constant, X.coefficients) for name, X in (("E", system.E), ("A", system.A))}
     law = {**candidate.law, "velocity_filter_time_constant_s": FILTER_SAMPLES * T, "inertia": inertia_table(robot)}
-    if law["kind"] == "delayed-feedback":
+    if law["kind"] == DelayedFeedbackLaw.tag():
         law["window_samples"] = round(WINDOW_S / T)
     asked = {name: report[name] for name in ("decay_per_s", "rate_per_s")}
     return TrackingDesign(

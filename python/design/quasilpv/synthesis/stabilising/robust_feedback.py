@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from quasilpv.certificate.laws.state_feedback import StateFeedbackLaw
 from quasilpv.conditions.condition import Options
 from quasilpv.conditions.theorems import iii9
 from quasilpv.errors import InfeasibleError
@@ -52,7 +53,7 @@ def robust_solver(robot: Robot) -> Solver:
         premises = [np.array([radius**2 * bound, 0.0]) for bound in model.system.premises[0].bounds]
         K = np.stack([radius * feedback.gain(z)[:, :2] for z in premises])
         return Candidate(
-            law={"kind": "state-feedback", "gain": model.polytope.to_document(K)},
+            law={"kind": StateFeedbackLaw.tag(), "gain": model.polytope.to_document(K)},
             witness={"P": (feedback.lyapunov / radius**2).tolist()},
             gain_limit=solution.objective,
             gain=lambda weights, inertia: np.asarray(np.tensordot(weights, K, axes=1)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from quasilpv.certificate.laws.dob_torque import DobTorqueLaw
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.inertia_schedule import premultiplied_schedule
 from quasilpv.synthesis.specification import Specification
@@ -72,11 +73,11 @@ def tracking_design(
         vertices = VertexTables(tables.inertia, tables.feedback, tables.observer)
         witness["envelope"] = torque_envelope(robot, vertices, witness)
     return TrackingDesign(
-        controller="dob-torque",
+        controller=DobTorqueLaw.tag(),
         robot=robot,
         sample_period_s=specification.sample_period_s,
         law={
-            "kind": "dob-torque",
+            "kind": DobTorqueLaw.tag(),
             "feedback": tables.polytope.to_document(tables.feedback),
             "observer": tables.polytope.to_document(tables.observer),
             "filter_time_constant_s": tables.filter_time_constant_s,
@@ -87,7 +88,7 @@ def tracking_design(
             "premises": tuple(premise.expression for premise in design.schedule.premises),
             "gravity": tuple(robot.model.symbolic.gravity),
         },
-        inputs={"controller": "dob-torque", "specification": specification.to_document()},
+        inputs={"controller": DobTorqueLaw.tag(), "specification": specification.to_document()},
         report=design.report(),
         witness=witness,
     )

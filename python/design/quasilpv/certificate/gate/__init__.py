@@ -1,0 +1,1 @@
+"""The robust gates: a proof where the loop decouples into scalar ones, a grid elsewhere."""

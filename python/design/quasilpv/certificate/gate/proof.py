@@ -1,0 +1,251 @@
+"""The robust gate of the acceleration-level law: a theorem about every posture, payload and small delay, or a refusal.
+
+In the coordinates that diagonalise ``M_t^-1 M_n`` (similar to a symmetric positive definite matrix, so its eigenvalues
+mu are real and positive) the frozen sampled loop of n joints is n copies of one scalar loop. It is stable in every
+posture of the operating domain, with every payload and with every constant transport delay up to the specified one,
+if the *needed range* of ``M_t / M_n = 1 / mu`` lies in the *inertia margin* of the scalar loop at all these delays. All
+three are proved in exact or ball arithmetic (``docs/concepts/robust-gate.md`` says what is not).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from flint import fmpq, fmpq_poly
+
+from quasilpv.certificate.exact.claims import Evidence
+from quasilpv.certificate.exact.rationals import float_at_most, to_float
+from quasilpv.certificate.gate.delay import DelayMargin, delay_margin
+from quasilpv.certificate.gate.loop import AccelerationLoopData, CharacteristicPolynomial, Controller
+from quasilpv.certificate.gate.lyapunov import Bound, is_function_proved
+from quasilpv.certificate.gate.margin import InertiaMargin, inertia_margin
+from quasilpv.certificate.gate.motion import MotionDocument, is_proved_in_motion
+from quasilpv.certificate.reading import Shipped, WitnessDocument
+from quasilpv.certificate.robot.data import inertia_data
+from quasilpv.certificate.robot.range import InertiaPair, NeededRange, Place, needed_range
+
+GROWTH_RATIOS = 61
+CURVE_POINTS = 41
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WorstCase:
+    """Numerical, not proved: the largest growth rate over the needed range, and a place where such a ratio occurs."""
+
+    growth_rate_per_s: float
+    delay_s: float
+    place: Place
+
+
+@dataclass(frozen=True)
+class RobustGate:
+    """The verdict, and what it rests on.
+
+    Attributes:
+        loop: the law as shipped.
+        specified_delay_samples: the transport delay the design has to tolerate.
+        margin: inertia margin at that delay; None if the loop is not stable at ``M_t = M_n``.
+        needed: which ratios occur; None if no bounds could be proved.
+        delays: up to which delay the needed range is inside; None without a needed range.
+        worst: numerical worst case over the needed range; None without one.
+        motion: whether one Lyapunov function is proved common to all motions (`gate_motion`), and the one that is
+            shipped is one (`gate_lyapunov`); None if the artifact does not claim it.
+    """
+
+    loop: AccelerationLoopData
+    specified_delay_samples: fmpq
+    margin: InertiaMargin | None
+    needed: NeededRange | None
+    delays: DelayMargin | None
+    worst: WorstCase | None
+    motion: bool | None = None
+
+    def __repr__(self) -> str:
+        """The verdict in a line."""
+        return f"RobustGate(passed={self.passed}, evidence={self.evidence}, delay_margin_s={self.delay_margin_s})"
+
+    @property
+    def passed(self) -> bool:
+        """Whether the needed range is proved inside the margin for every constant delay up to the specified one.
+
+        If the artifact claims more, one Lyapunov function for all motions, that must be proved as well.
+        """
+        if self.motion is False:
+            return False
+        if self.margin is None or self.needed is None or self.delays is None or self.delays.proved is None:
+            return False
+        inside = self.margin.contains(self.needed.lowest, self.needed.highest)
+        return inside and self.delays.proved >= self.specified_delay_samples
+
+    @property
+    def delay_margin_s(self) -> float | None:
+        """The largest proved delay; None if the needed range is not inside the margin even without delay."""
+        if self.delays is None or self.delays.proved is None:
+            return None
+        return float_at_most(self.delays.proved * self.sample_period)
+
+    @property
+    def sample_period(self) -> fmpq:
+        """T, exactly."""
+        return fmpq(*self.loop.sample_period_s.as_integer_ratio())
+
+    @property
+    def evidence(self) -> Evidence:
+        """Exact arithmetic on enclosures of cosines over the whole operating domain."""
+        return Evidence.ENCLOSED
+
+    def why_not_passed(self) -> str:
+        """Half a line: what was wanted and what was found."""
+        if self.motion is False:
+            return "robust gate: one Lyapunov function for all motions is claimed, but not proved"
+        if self.needed and self.margin:
+            (a, b), (low, high) = self.needed.to_floats(), self.margin.to_floats()
+            inside = f"inside the inertia margin [{low:.4g}, {'infinity' if high is None else f'{high:.4g}'}]"
+            return f"robust gate: needed range [{a:.4g}, {b:.4g}] not proved {inside}"
+        rate = "" if self.worst is None else f", worst growth rate {self.worst.growth_rate_per_s:.3g} 1/s"
+        return f"robust gate: not passed{rate}"
+
+    def to_document(self) -> dict[str, Any]:
+        """JSON-able: what ``design robust --json`` prints, bounds rounded to the safe side.
+
+        null stands for no bound (upper end of the margin) or no value. This gate passes only what it proves; `proved`
+        tells it from a gate that samples.
+        """
+        worst = self.worst
+        where = None if worst is None else {**_place_document(worst.place), "delay_s": worst.delay_s}
+        return {
+            "passed": self.passed,
+            "proved": self.passed,
+            "evidence": self.evidence.value,
+            "inertia_margin": None if self.margin is None else list(self.margin.to_floats()),
+            "delay_margin_s": self.delay_margin_s,
+            "proved_in_motion": self.motion,
+            "needed_range": None if self.needed is None else list(self.needed.to_floats()),
+            "worst_growth_rate_per_s": None if worst is None else worst.growth_rate_per_s,
+            "where": where,
+        }
+
+
+class MotionWitness(WitnessDocument):
+    """The part of a witness that the gate reads."""
+
+    motion: MotionDocument | None = None
+
+
+def robust_gate(
+    shipped: Shipped[Any], loop: AccelerationLoopData, delay_samples: fmpq, bound: Bound | None = None
+) -> RobustGate:
+    """Put an artifact to the gate.
+
+    Args:
+        shipped: the artifact.
+        loop: its law.
+        delay_samples: the transport delay it has to tolerate, in samples.
+        bound: the bound of a Lyapunov function, if the law ships one.
+
+    Raises:
+        InputError: a robot the gate does not know, or data that contradict each other.
+    """
+    inertia = InertiaPair(inertia_data(shipped))
+    margin, needed = inertia_margin(loop, delay_samples), needed_range(inertia)
+    if needed is None:
+        return RobustGate(loop, delay_samples, margin, None, None, None)
+    delays = delay_margin(loop, needed.lowest, needed.highest)
+    worst = worst_case(loop, inertia, needed, (fmpq(0), delay_samples))
+    motion = _proved_in_motion(shipped, loop, inertia, bound)
+    return RobustGate(loop, delay_samples, margin, needed, delays, worst, motion)
+
+
+def _proved_in_motion(
+    shipped: Shipped[Any], loop: AccelerationLoopData, inertia: InertiaPair, bound: Bound | None
+) -> bool | None:
+    """Whether all that an artifact claims of motions is proved; None if it claims nothing."""
+    claimed, source = shipped.witness(MotionWitness).motion, shipped.source
+    if claimed is None:
+        return None if bound is None else False
+    return is_proved_in_motion(claimed, loop, inertia, source) and is_function_proved(
+        claimed, bound, loop, inertia.data.joints, source
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class MarginCurve:
+    """The proved inertia margin at a series of delays.
+
+    Attributes:
+        delay_s: (N,).
+        lowest: (N,) lower limits of ``M_t / M_n``, NaN where the loop is not stable at ``M_t = M_n``.
+        highest: (N,) upper limits, infinite where there is none, NaN as above.
+    """
+
+    delay_s: FloatArray
+    lowest: FloatArray
+    highest: FloatArray
+
+
+def margin_curve(loop: AccelerationLoopData, longest_samples: fmpq, points: int = CURVE_POINTS) -> MarginCurve:
+    """The inertia margin at equally spaced delays from 0 to the longest.
+
+    Args:
+        loop: the law as shipped.
+        longest_samples: > 0, in samples.
+        points: how many, at least 2.
+    """
+    delays = [longest_samples * k / (points - 1) for k in range(points)]
+    limits = np.full((points, 2), np.nan)
+    for row, delay in enumerate(delays):
+        margin = inertia_margin(loop, delay)
+        if margin is not None:
+            low, high = margin.to_floats()
+            limits[row] = low, np.inf if high is None else high
+    delay_s = np.array([to_float(delay) for delay in delays]) * loop.sample_period_s
+    return MarginCurve(delay_s, limits[:, 0], limits[:, 1])
+
+
+def worst_case(
+    loop: AccelerationLoopData, inertia: InertiaPair, needed: NeededRange, delays: Sequence[fmpq]
+) -> WorstCase:
+    """Largest ``log(spectral radius) / T`` over a grid of the needed range and some delays, in double arithmetic.
+
+    Args:
+        loop: the law as shipped.
+        inertia: where ratios occur.
+        needed: the range.
+        delays: transport delays in samples.
+    """
+    ratios = np.geomspace(*needed.to_floats(), GROWTH_RATIOS)
+    rates = {delay: growth_rates(loop, delay, ratios) for delay in delays}
+    delay = max(rates, key=lambda key: float(rates[key].max()))
+    row = int(rates[delay].argmax())
+    place = min(
+        (needed.where_lowest, needed.where_highest, inertia.nearest_place(float(ratios[row]))),
+        key=lambda candidate: abs(candidate.inertia_ratio - ratios[row]),
+    )
+    return WorstCase(float(rates[delay][row]), to_float(delay) * loop.sample_period_s, place)
+
+
+def growth_rates(loop: AccelerationLoopData, delay_samples: fmpq, ratios: FloatArray) -> FloatArray:
+    """``log(largest root) / T`` at each ratio ``M_t / M_n``, 1/s, numerical.
+
+    The slow roots are clustered near z = 1: computed as roots in ``zeta = z - 1``, around 0, they keep their digits.
+    """
+    polynomial = CharacteristicPolynomial.of(Controller.of(loop, loop.filter_poles()[0]), delay_samples)
+    shift = fmpq_poly([1, 1])
+    F, G = (np.array([to_float(x) for x in part(shift).coeffs()[::-1]]) for part in (polynomial.F, polynomial.G))
+    G = np.concatenate([np.zeros(F.size - G.size), G])
+    radius = [np.abs(1.0 + np.roots(F + G / ratio)).max() for ratio in ratios]
+    return np.asarray(np.log(radius) / loop.sample_period_s)
+
+
+def _place_document(place: Place) -> dict[str, Any]:
+    return {
+        "angle_rad": list(place.angle_rad),
+        "payload_fraction": place.payload_fraction,
+        "inertia_ratio": place.inertia_ratio,
+    }

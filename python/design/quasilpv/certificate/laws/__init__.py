@@ -1,0 +1,1 @@
+"""One file per law kind: its document, what it claims, how it is frozen; `registry` lists them."""

@@ -1,0 +1,1 @@
+"""Robots in exact arithmetic and in doubles, rebuilt from what an artifact says of them."""
