@@ -15,7 +15,7 @@ PACKAGE = Path(quasilpv.__file__).parent
 LAW_FILES = "certificate/laws"
 
 PRESETS = {
-    "synthesis/__init__.py": "the controllers by name, some of which are named as their law",
+    "synthesis/registry.py": "the controllers by name, some of which are named as their law",
     "cli/options.py": "their short names",
     "cli/track.py": "those that are compared if nobody says otherwise",
     "figures/style.py": "their colours",

@@ -36,6 +36,7 @@ _DESIGN_ROOMS = (
     "files",
     "arrays.py",
     "defaults.py",
+    "progress.py",
     "release.py",
 )
 
