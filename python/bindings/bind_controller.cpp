@@ -118,7 +118,10 @@ void bind_artifact(py::module_& module) {
       .def(
           "gravity",
           [](const Artifact& artifact, const DoubleArray& angle) {
-            return evaluate_angles(artifact.law().model.gravity, artifact, angle);
+            const JointArray at = to_joint_array(angle, artifact.joints(), "angle");
+            JointArray torque{};
+            artifact.law().model.gravity_at(at.data(), torque.data());
+            return to_numpy(torque, artifact.joints());
           },
           py::arg("angle"), "G(y), N m, shape (joints,).")
       .def("coriolis", &evaluate_coriolis, py::arg("angle"), py::arg("speed"), py::arg("reference_speed"),

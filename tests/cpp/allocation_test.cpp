@@ -57,11 +57,13 @@ namespace {
 using ::quasilpv::testing::artifact_table;
 using ::quasilpv::testing::calls_in;
 using ::quasilpv::testing::json_twin;
+using ::quasilpv::testing::kChainLaws;
 using ::quasilpv::testing::kLawKinds;
 using ::quasilpv::testing::kPaces;
 using ::quasilpv::testing::make_loop;
 using ::quasilpv::testing::QuietRobot;
 using ::quasilpv::testing::run_control_thread;
+using ::quasilpv::testing::with_chain;
 
 class Allocation : public ::testing::Test {
  protected:
@@ -107,6 +109,33 @@ TEST_F(Allocation, does_not_happen_in_10000_steps_of_any_law_whatever_the_input)
       EXPECT_EQ(count, 0) << kind << ", " << joints << " joints";
       EXPECT_EQ(flags & (kMeasurementInvalid | kReferenceInvalid | kPremiseOutsideBox),
                 kMeasurementInvalid | kReferenceInvalid | kPremiseOutsideBox);
+    }
+  }
+}
+
+TEST_F(Allocation, does_not_happen_in_laws_with_a_chain_of_bodies_whether_limits_act_or_not) {
+  for (const char* kind : kChainLaws) {
+    for (const int joints : {1, 6, 7}) {
+      Controller controller(Artifact::parse(json_twin(with_chain(artifact_table(kind, joints))), "test"));
+      std::uint32_t flags = 0;
+      int moved = 0;
+      const int count = calls_in([&] {
+        for (int k = 0; k < 2000; ++k) {
+          StepInput input;
+          input.seq = k;
+          input.valid = k % 13 != 0;
+          input.angle.fill(3e-4 * k);
+          input.speed.fill(0.1);
+          input.reference.angle.fill(k % 500 == 499 ? 9.0 : 3e-4 * k);
+          const StepReport report = controller.step(input);
+          flags |= report.flags;
+          moved += report.torque_applied[0] != 0.0 ? 1 : 0;
+        }
+      });
+      EXPECT_EQ(count, 0) << kind << ", " << joints << " joints";
+      EXPECT_GT(moved, 1000);
+      EXPECT_NE(flags & (kTorqueSaturated | kSlewLimited), 0U) << kind;
+      EXPECT_EQ(flags & (kPremiseOutsideBox | kModelInvalid), 0U);
     }
   }
 }

@@ -339,6 +339,33 @@ inline Json artifact_table(const std::string& kind, int joints) {
           {"verification", {{"note", "\u00fcbung \"quoted\"\n"}}}};
 }
 
+/// The kinds of laws whose design inertia may be a chain of bodies.
+inline constexpr const char* kChainLaws[] = {"dob-acceleration", "pid", "ctc", "ctc-dob"};
+
+/// The same artifact for a robot in space: a chain of bodies about axes in turn, with a load for its gravity only.
+inline Json with_chain(Json document) {
+  const int joints = document["joints"].get<int>();
+  Json bodies = Json::array();
+  for (int k = 0; k < joints; ++k) {
+    Json axis = {0.0, 0.0, 0.0};
+    axis[static_cast<std::size_t>(k % 3)] = 1.0;
+    bodies.push_back({{"name", "joint" + std::to_string(k)},
+                      {"kind", "revolute"},
+                      {"rotation", {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}},
+                      {"translation_m", {0.1, 0.02, 0.3}},
+                      {"axis", axis},
+                      {"mass_kg", 3.0},
+                      {"first_moment_kg_m", {0.0, 0.1, 0.4}},
+                      {"rotational_kg_m2", {{0.2, 0.0, 0.0}, {0.0, 0.2, 0.0}, {0.0, 0.0, 0.1}}},
+                      {"rotor_inertia_kg_m2", 0.1}});
+  }
+  document["law"]["inertia"] = {{"kind", "tree"}, {"gravity_m_s2", {0.0, 0.0, -9.81}}, {"joints", bodies}};
+  document["law"]["gravity_load"] = {{"mass_kg", 1.5}, {"first_moment_kg_m", {0.0, 0.0, 0.2}}};
+  document["programs"] = Json::object();
+  document["schema_version"] = 2;
+  return document;
+}
+
 inline Json with_hash(Json document) {
   document["hash"] = sha256_hex(canonical_json(document));
   return document;

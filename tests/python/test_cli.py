@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,11 @@ ROW = {
     "rate_hz": float,
     "rms_x_m": float,
     "rms_y_m": float,
+    "rms_z_m": NoneType,
     "mav_x_m": float,
     "mav_y_m": float,
+    "rms_tool_m": float,
+    "max_tool_m": float,
     "rms_torque_nm": float,
     "rms_torque_increment_nm": float,
     "rms_velocity_error_rad_s": float,

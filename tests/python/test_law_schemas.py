@@ -26,7 +26,8 @@ NAMES_OF_TYPES: list[tuple[Any, str]] = [
     (Matrix, "matrix"),
     (tuple[Matrix, ...], "matrices"),
     (PolytopeTable, "polytope"),
-    (DesignInertia, "polytope"),  # a robot in space is no design inertia at run time yet
+    (tuple[Number, Number, Number], "numbers"),
+    (DesignInertia, "design-inertia"),
 ]
 """What the run-time side calls a type of this side."""
 

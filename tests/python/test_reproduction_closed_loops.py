@@ -66,7 +66,7 @@ def test_one_number_too_large_is_enough_to_fail(values: dict[str, float], data: 
 
 
 def metrics(**changes: float) -> Metrics:
-    return replace(Metrics(1e-3, 2e-3, 3e-3, 4e-3, 100.0, 5.0, 0.01, 0.0, 0.0), **changes)
+    return replace(Metrics(1e-3, 2e-3, None, 3e-3, 4e-3, 3e-3, 5e-3, 100.0, 5.0, 0.01, 0.0, 0.0), **changes)
 
 
 def stand_in(numbers: Metrics, speed_error: float = 0.1) -> Outcome:

@@ -54,15 +54,16 @@ from quasilpv.scenarios import (
 from quasilpv.synthesis import DEFAULT_CONTROLLER, DesignRequest, specification_for, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots import registry
-from quasilpv.systems.robots.registry import Robot
-from quasilpv.trajectories import TaskPath, Trajectory, plan
+from quasilpv.systems.robots.registry import AnyRobot
+from quasilpv.systems.robots.spatial_robot import SpatialRobot
+from quasilpv.trajectories import SpatialPath, TaskPath, Trajectory, plan, plan_in_space
 
 __all__ = ["Design", "GateResult", "Simulation", "design", "gate", "robot", "simulate", "verify"]
 
 ArtifactLike: TypeAlias = Artifact | Path | str
 """An artifact, or a file that holds one, either twin."""
 
-Reference: TypeAlias = str | Path | TaskPath | Trajectory | TrackingExperiment
+Reference: TypeAlias = str | Path | TaskPath | SpatialPath | Trajectory | TrackingExperiment
 """What a robot is to do: the id of a scenario, a path in task space, a trajectory, or a file of either."""
 
 LINES = 6
@@ -71,7 +72,7 @@ LINES = 6
 MOST_DELAY_SAMPLES = 4.0
 """Of a gate, as for `quasilpv.synthesis.Specification`."""
 
-robot = registry.robot
+robot = registry.any_robot
 
 _ON_AXES: Mapping[str, Callable[[Axes, TrackResult], None]] = {
     "path": plot_path,
@@ -92,7 +93,7 @@ class Design:
     tracking: TrackingDesign
 
     @property
-    def robot(self) -> Robot:
+    def robot(self) -> AnyRobot:
         """What it is for."""
         return self.tracking.robot
 
@@ -230,12 +231,12 @@ class Simulation:
             "largest error": f"{1e3 * metrics.mav_x_m:.3g} mm in X, {1e3 * metrics.mav_y_m:.3g} mm in Y",
             "torque": f"{metrics.rms_torque_nm:.3g} N m rms, {metrics.rms_torque_increment_nm:.3g} N m per sample",
             "at a limit": f"{100.0 * metrics.share_at_limit:.3g} % of the samples",
-            "premises outside their box": f"by up to {metrics.largest_premise_excess:.3g} of its width",
+            "premises outside their box": f"by up to {metrics.largest_premise_excess or 0.0:.3g} of its width",
         }
 
 
 def design(
-    robot: Robot | str,
+    robot: AnyRobot | str,
     law: str = DEFAULT_CONTROLLER,
     *,
     rate_hz: float | None = None,
@@ -261,7 +262,7 @@ def design(
         InputError: an unknown robot or law, a number out of range, or a law that cannot do without compensation.
         InfeasibleError: no design meets the specification.
     """
-    source = registry.robot(robot) if isinstance(robot, str) else robot
+    source = registry.any_robot(robot) if isinstance(robot, str) else robot
     wanted = specification_for(
         source,
         law,
@@ -318,7 +319,7 @@ def simulate(
     sensors: Sensors | None = None,
     external_torque: tuple[SineTorque, ...] | None = None,
     transport_delay_s: float = 0.0,
-    robot: Robot | None = None,
+    robot: AnyRobot | None = None,
     folder: Path | str | None = None,
 ) -> Simulation:
     """Run a controller in closed loop: the C++ runtime against the simulated robot, in this process.
@@ -371,7 +372,7 @@ def _content(artifact: ArtifactLike) -> tuple[Mapping[str, Any], str]:
 
 
 def _experiment(
-    artifact: Artifact, reference: Reference, source: Robot | None, torque: tuple[SineTorque, ...] | None
+    artifact: Artifact, reference: Reference, source: AnyRobot | None, torque: tuple[SineTorque, ...] | None
 ) -> TrackingExperiment:
     """The experiment in which the robot of an artifact does what is asked for."""
     if isinstance(reference, TrackingExperiment):
@@ -387,11 +388,16 @@ def _experiment(
     return replace(experiment, external_torque=torque)
 
 
-def _trajectory(reference: str | Path | TaskPath | Trajectory, robot: Robot) -> Trajectory:
+def _trajectory(reference: str | Path | TaskPath | SpatialPath | Trajectory, robot: AnyRobot) -> Trajectory:
     """The reference in joint space: as it is, or planned for the robot."""
     if isinstance(reference, Trajectory):
         return reference
-    if isinstance(reference, TaskPath):
+    if isinstance(reference, TaskPath | SpatialPath):
+        if isinstance(robot, SpatialRobot) and isinstance(reference, SpatialPath):
+            return plan_in_space(robot.tree, reference, robot.domain)
+        if isinstance(robot, SpatialRobot) or isinstance(reference, SpatialPath):
+            got, expected = f"a {type(reference).__name__}", "a TaskPath in the plane, a SpatialPath in space"
+            raise InputError(reference.name, "path", f"{got} for {robot.id}", expected)
         return plan(robot.model, reference, robot.domain)
     source, path = str(reference), Path(reference)
     if isinstance(reference, str) and not path.suffix:

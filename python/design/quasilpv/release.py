@@ -25,7 +25,7 @@ from quasilpv.synthesis import DesignRequest, synthesise
 from quasilpv.synthesis.actuator_demand import MotionsOf, no_motions, unmet_demands
 from quasilpv.synthesis.baselines.printed import reference_speeds
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.robots.registry import Robot
+from quasilpv.systems.robots.registry import AnyRobot, Robot
 
 NEEDED_OF_CLAIMS = Evidence.ENCLOSED
 """Every claim of a released artifact is proved; a sampled one does not suffice."""
@@ -125,7 +125,7 @@ def _released_unverified(failures: Sequence[str], evidence: Mapping[str, Any] | 
     return {"verification": {**(evidence or {}), "released_unverified": True}} if failures else {}
 
 
-def design_inputs(robot_model: Robot, inputs: Mapping[str, Any]) -> dict[str, Any]:
+def design_inputs(robot_model: AnyRobot, inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Everything a design depends on, JSON-able: its hash names the design."""
     return {
         "creator": __version__,
@@ -164,6 +164,8 @@ def to_artifact(design: TrackingDesign) -> Artifact:
 
 
 def _programs(design: TrackingDesign) -> dict[str, Program]:
+    if not isinstance(design.robot, Robot):
+        return {}  # a robot in space computes what its laws need by itself
     symbolic = design.robot.model.symbolic
     inputs: dict[sp.Symbol, tuple[str, int]] = {}
     for name, symbols in (

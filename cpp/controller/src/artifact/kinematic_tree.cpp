@@ -93,8 +93,24 @@ KinematicTree read_tree(const Field& field) {
   return tree;
 }
 
+KinematicTree read_bare_tree(const Field& field) {
+  field.only({"kind", "gravity_m_s2", "joints"});
+  field["kind"].expect_text("tree");
+  const Field joints = field["joints"];
+  for (std::size_t k = 0; k < joints.size(); ++k) {
+    joints.at(k).only({"name", "kind", "rotation", "translation_m", "axis", "mass_kg", "first_moment_kg_m",
+                       "rotational_kg_m2", "rotor_inertia_kg_m2"});
+  }
+  return read_tree(field);
+}
+
+GravityLoad read_gravity_load(const Field& field) {
+  field.only({"mass_kg", "first_moment_kg_m"});
+  return {field["mass_kg"].non_negative(), read_vector(field["first_moment_kg_m"])};
+}
+
 TreeDynamics::TreeDynamics(const KinematicTree& tree)
-    : joint_{}, gravity_(tree.gravity_m_s2), joints_(static_cast<int>(tree.joints.size())) {
+    : joint_{}, gravity_(tree.gravity_m_s2), load_(tree.gravity_load), joints_(static_cast<int>(tree.joints.size())) {
   for (std::size_t k = 0; k < tree.joints.size(); ++k) {
     const TreeJoint& joint = tree.joints[k];
     joint_[k] = {joint.turns,   joint.rotation.transpose(), joint.translation_m,    joint.axis,

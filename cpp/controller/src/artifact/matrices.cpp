@@ -40,6 +40,17 @@ BlockPolytope read_inertia(const Field& field, int joints) {
   return inertia;
 }
 
+std::shared_ptr<const TreeDynamics> read_design_tree(const Field& field, int joints, const Field* load) {
+  KinematicTree tree = read_bare_tree(field);
+  if (tree.joints.size() != static_cast<std::size_t>(joints)) {
+    field["joints"].fail(std::to_string(tree.joints.size()) + " joints", std::to_string(joints));
+  }
+  if (load != nullptr) {
+    tree.gravity_load = read_gravity_load(*load);
+  }
+  return std::make_shared<const TreeDynamics>(tree);
+}
+
 Eigen::MatrixXd read_lyapunov(const Field& field, int size) {
   Eigen::MatrixXd lyapunov = parse_matrix(field, size, size);
   require_symmetric(field, "a matrix", lyapunov, "a symmetric matrix");

@@ -44,6 +44,7 @@ struct TreeSweep {
 
   static const Joint& joint(const TreeDynamics& tree, int k) { return tree.joint_[static_cast<std::size_t>(k)]; }
   static const Eigen::Vector3d& gravity(const TreeDynamics& tree) { return tree.gravity_; }
+  static const GravityLoad& load(const TreeDynamics& tree) { return tree.load_; }
 
   template <class Scalar>
   static Pose<Scalar> pose(const Joint& joint, const Scalar& q) {
@@ -109,6 +110,14 @@ struct TreeSweep {
         wrenches[place].linear += v.angular.cross(p.linear);
         wrenches[place].angular += v.angular.cross(p.angular) + v.linear.cross(p.linear);
       }
+    }
+    if (load(tree).mass_kg > 0.0) {
+      Vector3<Scalar> up = -gravity(tree).template cast<Scalar>();
+      for (int k = 0; k < n; ++k) {
+        up = poses[static_cast<std::size_t>(k)].E * up;
+      }
+      const Vector3<Scalar> first = load(tree).first_moment_kg_m.template cast<Scalar>();
+      add(Spatial<Scalar>{up * Scalar(load(tree).mass_kg), first.cross(up)}, wrenches[static_cast<std::size_t>(n - 1)]);
     }
     for (int k = n - 1; k >= 0; --k) {
       const Joint& own = joint(tree, k);

@@ -16,7 +16,7 @@ struct ComputedTorqueParameters final : VelocityParameters {
   JointArray gi{};
   double observer_bandwidth_rad_s = 0.0;  ///< 0: without observer
 
-  const Program* coriolis() const noexcept override { return &bias; }
+  const Program* coriolis() const noexcept override { return model.tree ? nullptr : &bias; }
   std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
 };
 
@@ -68,16 +68,23 @@ class ComputedTorqueLaw final : public VelocityLaw<N> {
 
   Command<N> control(const Sample& sample, const ModelSample<N>& model, StepReport& report) noexcept override {
     const auto& [reference, y, w, integral] = sample;
-    coriolis_.evaluate({y.data(), w.data(), nullptr}, bias_.data());
-    bias_ += model.gravity;
-
     const JointVector<N> disturbance = observer_state_ + observer_gain_ * w;
-    to_array<N>(model.inertia * disturbance, report.estimated_disturbance);
+    if (model.tree == nullptr) {
+      coriolis_.evaluate({y.data(), w.data(), nullptr}, bias_.data());
+      bias_ += model.gravity;
+      to_array<N>(model.inertia * disturbance, report.estimated_disturbance);
+    } else {
+      model.tree->inverse_dynamics(y.data(), w.data(), JointVector<N>::Zero().eval().data(), bias_.data());
+      to_array<N>(model.torque(disturbance) - model.gravity_torque(), report.estimated_disturbance);
+    }
     report.filtered_disturbance = report.estimated_disturbance;
     const JointVector<N> acceleration = reference.acceleration + gp_.cwiseProduct(reference.angle - y) +
                                         gd_.cwiseProduct(reference.speed - w) + gi_.cwiseProduct(integral) -
                                         disturbance;
-    return {model.inertia * acceleration + bias_, gi_};
+    if (model.tree == nullptr) {
+      return {model.inertia * acceleration + bias_, gi_};
+    }
+    return {model.torque(acceleration) - model.gravity_torque() + bias_, gi_};
   }
 
   // The observer. With bandwidth 0 the pole is 1 and the gain 0: the estimate stays zero. If the model has no finite
@@ -111,7 +118,7 @@ constexpr const char* kBandwidth = "disturbance_observer_bandwidth_rad_s";
 /// The two kinds have one document and differ in whether the bandwidth is zero.
 LawTable<ComputedTorqueParameters> table_of(const char* kind) {
   using P = ComputedTorqueParameters;
-  LawTable<P> law(kind);
+  LawTable<P> law(kind, Inertia::kTableOrChain);
   law.joint_values("gp", &P::gp);
   law.joint_values("gd", &P::gd);
   law.joint_values("gi", &P::gi);

@@ -62,13 +62,18 @@ class DobAccelerationLaw final : public ObserverLaw<N> {
     } else {
       acceleration_ = reference.acceleration + feedback;
     }
-    return {model.inertia * acceleration_ + model.gravity, JointVector<N>::Constant(parameters_.feedback.ki)};
+    return {model.torque(acceleration_), JointVector<N>::Constant(parameters_.feedback.ki)};
   }
 
-  // If the model has no finite answer, the commanded acceleration is predicted.
+  // If the model has no finite answer, the commanded acceleration is predicted. A chain of bodies is asked only where a
+  // limit acted: elsewhere the acceleration is the commanded one.
   Motion predict(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& /*reference*/,
                  StepReport& report) noexcept override {
-    JointVector<N> applied = model.acceleration(from_array<N>(report.torque_applied) - model.gravity);
+    const JointVector<N> torque = from_array<N>(report.torque_applied);
+    JointVector<N> applied = acceleration_;
+    if (model.tree == nullptr || torque != from_array<N>(report.torque_commanded)) {
+      applied = model.acceleration(torque - model.gravity_torque());
+    }
     if (!applied.allFinite()) {
       applied = acceleration_;
       report.flags |= kModelInvalid;
@@ -123,7 +128,7 @@ namespace laws {
 
 LawKind dob_acceleration() {
   using P = DobAccelerationParameters;
-  LawTable<P> law("dob-acceleration");
+  LawTable<P> law("dob-acceleration", Inertia::kTableOrChain);
   law.object("feedback", &P::feedback, feedback_table());
   law.numbers("observer", &P::observer);
   law.positive("filter_time_constant_s", &P::filter_time_constant_s);

@@ -12,13 +12,16 @@ struct PidParameters final : VelocityParameters {
   JointArray kd{};
   JointArray ki{};
 
-  const Program* coriolis() const noexcept override { return &coriolis_reference; }
+  const Program* coriolis() const noexcept override { return model.tree ? nullptr : &coriolis_reference; }
   std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
 };
 
 /// With e = r - y, w the filtered measured speed:
 ///
 ///     Gamma = kp e + kd (r' - w) + ki e_I + M(z) r'' + N(y, w) r' + G(y), limited;   e_I += T e
+///
+/// With a chain of bodies as design inertia only gravity is fed forward, Gamma = kp e + kd (r' - w) + ki e_I + G(y):
+/// PID with gravity compensation, and PD for ki = 0.
 ///
 /// Anti-windup: see integrate_error(). Without a valid measurement the last one is held and e_I is frozen.
 /// Source: Dehak 2022, (III.54), with the sign of e that makes the printed gains stabilising.
@@ -39,10 +42,13 @@ class PidLaw final : public VelocityLaw<N> {
 
   Command<N> control(const Sample& sample, const ModelSample<N>& model, StepReport& /*report*/) noexcept override {
     const auto& [reference, y, w, integral] = sample;
-    JointVector<N> coriolis;
-    coriolis_reference_.evaluate({y.data(), w.data(), reference.speed.data()}, coriolis.data());
     const JointVector<N> feedback =
         kp_.cwiseProduct(reference.angle - y) + kd_.cwiseProduct(reference.speed - w) + ki_.cwiseProduct(integral);
+    if (model.tree != nullptr) {
+      return {feedback + model.gravity_torque(), ki_};
+    }
+    JointVector<N> coriolis;
+    coriolis_reference_.evaluate({y.data(), w.data(), reference.speed.data()}, coriolis.data());
     return {feedback + model.inertia * reference.acceleration + coriolis + model.gravity, ki_};
   }
 
@@ -62,7 +68,7 @@ namespace laws {
 
 LawKind pid() {
   using P = PidParameters;
-  LawTable<P> law("pid");
+  LawTable<P> law("pid", Inertia::kTableOrChain);
   law.joint_values("kp", &P::kp);
   law.joint_values("kd", &P::kd);
   law.joint_values("ki", &P::ki);

@@ -15,6 +15,7 @@ constexpr double kSpeedOffsetShare = 0.3;
 constexpr double kOffsetSpeed = 1.875;
 constexpr double kOffsetAcceleration = 5.7735026918962573;  // 10 / sqrt(3)
 constexpr double kSpeedAcceleration = 3.9399;
+constexpr int kPostures = 500;  // of a chain of bodies, whose inertia has no vertices
 
 double largest_row_sum(const BlockPolytope& inertia, Eigen::Index row) {
   double largest = 0.0;
@@ -24,12 +25,38 @@ double largest_row_sum(const BlockPolytope& inertia, Eigen::Index row) {
   return largest;
 }
 
+// Postures spread evenly over the domain by multiples of the golden ratio's generalisation (Roberts 2018), one root per
+// number of joints.
+JointArray posture(const Artifact& artifact, int number) {
+  double root = 2.0;
+  for (int i = 0; i < 60; ++i) {
+    root = std::pow(1.0 + root, 1.0 / (artifact.joints() + 1));
+  }
+  JointArray angle{};
+  for (int j = 0; j < artifact.joints(); ++j) {
+    const Interval& interval = artifact.domain().angle_rad[static_cast<std::size_t>(j)];
+    const double share = std::fmod(0.5 + number * std::pow(root, -(j + 1)), 1.0);
+    angle[static_cast<std::size_t>(j)] = interval.low + share * (interval.high - interval.low);
+  }
+  return angle;
+}
+
+double largest_row_sum(const Artifact& artifact, const TreeDynamics& tree, Eigen::Index row) {
+  double largest = 0.0;
+  for (int number = 0; number < kPostures; ++number) {
+    const JointArray angle = posture(artifact, number);
+    largest = std::max(largest, tree.inertia(angle.data()).row(row).cwiseAbs().sum());
+  }
+  return largest;
+}
+
 double largest_acceleration(const Artifact& artifact) {
-  const BlockPolytope& inertia = artifact.law().model.inertia;
+  const DesignModel& model = artifact.law().model;
   double acceleration = std::numeric_limits<double>::infinity();
   for (int row = 0; row < artifact.joints(); ++row) {
     const double limit = artifact.limits().torque_nm[static_cast<std::size_t>(row)];
-    acceleration = std::min(acceleration, limit / largest_row_sum(inertia, row));
+    const double sum = model.tree ? largest_row_sum(artifact, *model.tree, row) : largest_row_sum(model.inertia, row);
+    acceleration = std::min(acceleration, limit / sum);
   }
   return acceleration;
 }

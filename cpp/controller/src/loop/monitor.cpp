@@ -14,12 +14,14 @@ Monitor::Monitor(const Artifact& artifact)
 MonitorReport Monitor::observe(const StepInput& input, const StepReport& report) const noexcept {
   const bool measured = (report.flags & kMeasurementInvalid) == 0;
   const JointArray& angle = measured ? input.angle : report.estimated_angle;
-  std::array<double, kMaxPremises> premise{};
-  model_.premises.evaluate(ProgramInput{angle.data()}, premise.data());
   MonitorReport seen;
-  seen.premise_excess = model_.inertia.excess(premise.data());
-  model_.inertia.clamp(premise.data());
-  seen.membership_sum = model_.inertia.weight_sum(premise.data());
+  if (!model_.tree) {
+    std::array<double, kMaxPremises> premise{};
+    model_.premises.evaluate(ProgramInput{angle.data()}, premise.data());
+    seen.premise_excess = model_.inertia.excess(premise.data());
+    model_.inertia.clamp(premise.data());
+    seen.membership_sum = model_.inertia.weight_sum(premise.data());
+  }
   if (bound_ && (report.flags & (kMeasurementInvalid | kReferenceInvalid)) == 0) {
     seen.lyapunov = lyapunov(*bound_, input, report);
   }

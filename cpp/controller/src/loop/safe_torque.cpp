@@ -13,7 +13,7 @@ double finite_or_zero(double value) noexcept { return std::isfinite(value) ? val
 }  // namespace
 
 SafeTorque::SafeTorque(const Artifact& artifact, SafeAction action)
-    : gravity_(artifact.law().model.gravity),
+    : model_(artifact.law().model),
       action_(action),
       torque_limit_(artifact.limits().torque_nm),
       joints_(static_cast<std::size_t>(artifact.joints())) {
@@ -28,7 +28,7 @@ JointArray SafeTorque::apply(double share, const JointArray& from, const JointAr
                              const JointArray& speed) const noexcept {
   JointArray gravity{};
   if (action_ == SafeAction::kGravity) {
-    gravity_.evaluate({angle.data(), nullptr, nullptr}, gravity.data());
+    model_.gravity_at(angle.data(), gravity.data());
   }
   JointArray torque{};
   for (std::size_t j = 0; j < joints_; ++j) {

@@ -8,12 +8,13 @@ from typing import Annotated
 import typer
 
 from quasilpv.cli.console import JsonOption, print_json, print_note
-from quasilpv.cli.options import FormatOption, formats_of, requested
+from quasilpv.cli.options import FormatOption, formats_of, requested, robot_named
 from quasilpv.files import claim_folder
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
 ROBOT = "arm3"
 SCENARIOS = ("serial-square", "serial-circle")
+SCENARIOS_IN_SPACE = ("ur5-square", "ur5-circle")
 
 
 def demo_command(
@@ -26,12 +27,13 @@ def demo_command(
 ) -> None:
     """Design the default controller of the 3-DoF arm, then track the square and the circle with every controller.
 
-    Writes the artifact, a log and the figures of every run, and prints the table.
+    The same for a UR5 in space with an unknown load of 5 kg. Writes the artifact, a log and the figures of every run,
+    and prints the tables.
 
     \b
     The same, step by step:
       design synth arm3 -o out/demo/arm3
-      design track serial-square serial-circle -o out/demo
+      design track serial-square serial-circle ur5-square ur5-circle -o out/demo
 
     \b
     Example:
@@ -46,10 +48,12 @@ def demo_command(
     formats = formats_of(figure_formats)
     claim_folder(out)
     if not json:
-        print_note(f"a design for {ROBOT}, then every controller on {' and '.join(SCENARIOS)}: a few minutes")
-    released = write_released(requested(ROBOT, DEFAULT_CONTROLLER, None, None), out / ROBOT)
+        every = ", ".join((*SCENARIOS, *SCENARIOS_IN_SPACE))
+        print_note(f"a design for {ROBOT}, then every controller on {every}: a few minutes")
+    released = write_released(requested(robot_named(ROBOT), DEFAULT_CONTROLLER, None, None), out / ROBOT)
     session = Session(None, None, "perturbed", out)
-    results = run_all(session, [tracking_experiment(name) for name in SCENARIOS], default_variants())
+    experiments = [tracking_experiment(name) for name in (*SCENARIOS, *SCENARIOS_IN_SPACE)]
+    results = run_all(session, [(e, default_variants(in_space=e.robot.in_space)) for e in experiments])
     draw_results(results, out, formats)
     if json:
         print_json({**released, "runs": [result.row() for result in results]})

@@ -20,10 +20,10 @@ def listing_command(json: JsonOption = False) -> None:
     from quasilpv.reproduction import ITEMS
     from quasilpv.scenarios import tracking_experiments
     from quasilpv.systems.catalogue import system_names
-    from quasilpv.systems.robots.registry import robots
+    from quasilpv.systems.robots.registry import all_robots
 
     known: dict[str, list[dict[str, Any]]] = {
-        "robots": [{"id": robot.id, "summary": robot.summary} for robot in robots()],
+        "robots": [{"id": robot.id, "summary": robot.summary} for robot in all_robots()],
         "controllers": [{"id": name, "summary": kind.summary} for name, kind in CONTROLLERS.items()],
         "scenarios": [
             {"id": one.name, "summary": one.summary, "robot": one.robot.id} for one in tracking_experiments()

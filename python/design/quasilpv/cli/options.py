@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from quasilpv.artifact import Artifact
     from quasilpv.experiments.result import Variant
     from quasilpv.scenarios import Sensors
+    from quasilpv.systems.robots.registry import AnyRobot
 
 SHORT_NAMES = {"acceleration": "dob-acceleration", "moving": "dob-moving", "torque": "dob-torque"}
 
@@ -119,8 +120,26 @@ def require_controller(controller: str) -> str:
     return full
 
 
+def robot_named(text: str) -> AnyRobot:
+    """The robot that a person names: an id of the registry, or a ``robot.toml``.
+
+    Raises:
+        InputError: there is none of this name, or the file is none.
+    """
+    if text.endswith(".toml"):
+        from quasilpv.descriptions.plausibility import require_bodies
+        from quasilpv.descriptions.robot_file import read_robot_file
+
+        read = read_robot_file(Path(text)).robot()
+        require_bodies(read.tree, text)
+        return read
+    from quasilpv.systems.robots.registry import any_robot
+
+    return any_robot(text)
+
+
 def requested(
-    robot_id: str,
+    robot: AnyRobot,
     controller: str,
     rate_hz: float | None,
     encoder_bits: int | None,
@@ -131,25 +150,22 @@ def requested(
     """The design that options ask for, with the specification of `specification_for`.
 
     Raises:
-        InputError: an unknown robot, or a number out of range.
+        InputError: a number out of range.
     """
-    from quasilpv.systems.robots.registry import robot
-
-    source = robot(robot_id)
     wanted = specification_for(
-        source,
+        robot,
         controller,
         rate_hz=rate_hz,
         encoder_bits=encoder_bits,
         margin_spare=margin_spare,
         torque_activity=torque_activity,
     )
-    return DesignRequest(source, controller, wanted)
+    return DesignRequest(robot, controller, wanted)
 
 
-def designed(robot_id: str, variant: Variant, rate_hz: float | None, progress: Progress) -> Artifact:
+def designed(robot: AnyRobot, variant: Variant, rate_hz: float | None, progress: Progress) -> Artifact:
     """The controller of a variant, designed for its encoders; from the cache if it was designed before."""
     from quasilpv.experiments.designs import kept_design
 
-    asked = requested(robot_id, variant.controller, rate_hz, variant.encoder_bits)
+    asked = requested(robot, variant.controller, rate_hz, variant.encoder_bits)
     return kept_design(replace(asked, compensated=variant.compensated), progress=progress)

@@ -21,6 +21,20 @@ COLUMNS = (
 )
 
 
+COLUMNS_IN_SPACE = (
+    "controller",
+    "rate\nHz",
+    "rms X\nµm",
+    "rms Y\nµm",
+    "rms Z\nµm",
+    "rms tool\nµm",
+    "max tool\nµm",
+    "torque\nrms N m",
+    "increment\nrms N m",
+    "at a limit\n%",
+)
+
+
 def print_warnings(result: TrackResult, label: str = "") -> None:
     """Say on stderr where a run was outside of what is proved: at a limit, or outside the box of the premises.
 
@@ -32,7 +46,7 @@ def print_warnings(result: TrackResult, label: str = "") -> None:
     if result.metrics.share_at_limit > 0.0:
         share = f"a torque or slew limit acted in {100.0 * result.metrics.share_at_limit:.3g} % of the samples"
         print_note(f"{about}: {share}; certificate and gate hold while none does")
-    if result.metrics.largest_premise_excess > 0.0:
+    if (result.metrics.largest_premise_excess or 0.0) > 0.0:
         excess = f"a premise was outside its box by up to {result.metrics.largest_premise_excess:.3g} of its width"
         print_note(f"{about}: {excess}; certificate and gate hold inside")
 
@@ -41,9 +55,22 @@ def print_results(results: Sequence[TrackResult]) -> None:
     """Print one table per scenario on stdout."""
     for scenario in dict.fromkeys(result.scenario for result in results):
         own = [result for result in results if result.scenario == scenario]
-        print_table(
-            f"{scenario}, {own[0].plant} plant", COLUMNS, [cells(result, result.variant.label) for result in own]
-        )
+        in_space = own[0].metrics.rms_z_m is not None
+        columns, row = (COLUMNS_IN_SPACE, cells_in_space) if in_space else (COLUMNS, cells)
+        print_table(f"{scenario}, {own[0].plant} plant", columns, [row(result, result.variant.label) for result in own])
+
+
+def cells_in_space(result: TrackResult, label: str) -> list[str]:
+    """One row of `COLUMNS_IN_SPACE` under a label of its own."""
+    metrics = result.metrics
+    lengths = (metrics.rms_x_m, metrics.rms_y_m, metrics.rms_z_m or 0.0, metrics.rms_tool_m, metrics.max_tool_m)
+    return [
+        label,
+        f"{result.rate_hz:g}",
+        *(f"{1e6 * length:.3g}" for length in lengths),
+        *(_torque(value) for value in (metrics.rms_torque_nm, metrics.rms_torque_increment_nm)),
+        f"{100.0 * metrics.share_at_limit:.3g}",
+    ]
 
 
 def cells(result: TrackResult, label: str) -> list[str]:

@@ -14,7 +14,7 @@ from quasilpv.files import claim_file, write_atomically
 if TYPE_CHECKING:
     from quasilpv.descriptions.described_tree import DescribedTree
     from quasilpv.descriptions.inertia_range import InertiaRange
-    from quasilpv.descriptions.spatial_robot import SpatialRobot
+    from quasilpv.systems.robots.spatial_robot import SpatialRobot
 
 
 def robot_command(

@@ -49,7 +49,7 @@ def robust_command(
         claim_folder(out)
     found = gate(read_artifact(artifact).content(), str(artifact))
     if json:
-        print_json(found.to_document())
+        print_json(found.timed_document() if isinstance(found, RobustGate) else found.to_document())
     else:
         rows, verdict = (_rows(found), _verdict(found)) if isinstance(found, RobustGate) else _grid_answer(found)
         print_table(str(artifact), ("", ""), [*rows, ("evidence", found.evidence.value)], left_columns=2)
@@ -100,7 +100,8 @@ def _rows(gate: RobustGate) -> list[tuple[str, str]]:
     needed = _interval(*gate.needed.to_floats()) if gate.needed else "none"
     rows = [
         (f"inertia margin with {to_float(gate.specified_delay_samples):g} samples of delay", margin),
-        ("needed range of M_t/M_n", needed),
+        ("needed range of M_t/M_n (proved)", needed),
+        ("  found at samples", _interval(*gate.sampled_range) if gate.sampled_range else "none"),
         ("delay margin", _delay(gate)),
         (
             "one Lyapunov function for all motions",

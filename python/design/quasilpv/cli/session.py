@@ -44,7 +44,7 @@ class Session:
 
     def controller(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> Artifact:
         """The controller of a run: the given one, or the variant's design."""
-        return self.given or designed(experiment.robot.id, variant, self.rate_hz, progress=steps.parts)
+        return self.given or designed(experiment.robot, variant, self.rate_hz, progress=steps.parts)
 
     def folder(self, experiment: TrackingExperiment, variant: Variant) -> Path:
         """Where the files of a run are."""

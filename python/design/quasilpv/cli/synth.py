@@ -16,13 +16,16 @@ from quasilpv.cli.options import (
     SpareOption,
     requested,
     require_controller,
+    robot_named,
 )
 from quasilpv.files import claim_folder
 from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, DesignRequest
 
 
 def synth_command(
-    robot_id: Annotated[str, typer.Argument(metavar="ROBOT", help="Robot id, see design list.")],
+    robot_id: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="Robot id, see design list, or a robot.toml: design robot show.")
+    ],
     *,
     controller: Annotated[
         str,
@@ -39,7 +42,7 @@ def synth_command(
         ),
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="DIR", help="Folder for both twins.  [default: out/ROBOT]")
+        Path | None, typer.Option("-o", "--out", metavar="DIR", help="Folder for both twins.  [default: out/ID]")
     ] = None,
     json: JsonOption = False,
 ) -> None:
@@ -52,15 +55,16 @@ def synth_command(
     Example:
       design synth arm3 --rate-hz 2000 -o out/arm3-2khz
     """
+    source = robot_named(robot_id)
     wanted = requested(
-        robot_id,
+        source,
         require_controller(controller),
         rate_hz,
         encoder_bits,
         margin_spare=margin_spare,
         torque_activity=torque_activity,
     )
-    folder = out or Path("out") / robot_id
+    folder = out or Path("out") / source.id
     claim_folder(folder)
     answer = write_released(wanted, folder, allow_unverified=allow_unverified)
     if json:

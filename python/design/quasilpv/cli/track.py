@@ -19,6 +19,7 @@ from quasilpv.cli.options import (
     formats_of,
     plant_kind,
     require_controller,
+    robot_named,
     sensors_of,
 )
 from quasilpv.defaults import ENCODER_BITS
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from quasilpv.cli.session import Session
     from quasilpv.experiments.result import TrackResult, Variant
     from quasilpv.scenarios import TrackingExperiment
-    from quasilpv.systems.robots.registry import Robot
+    from quasilpv.systems.robots.registry import AnyRobot
 
 DEFAULT_CONTROLLERS = (
     "pid",
@@ -43,6 +44,7 @@ DEFAULT_CONTROLLERS = (
     "dob-torque",
     "dob-acceleration",
 )
+CONTROLLERS_IN_SPACE = ("pid-tuned", "ctc-tuned", "dob-acceleration")
 COARSE_ENCODER_BITS = 17
 
 
@@ -55,7 +57,10 @@ def track_command(
     controllers: Annotated[
         list[str] | None,
         typer.Option(
-            "--controller", metavar="ID", help=f"May be repeated.  [default: {', '.join(DEFAULT_CONTROLLERS)}]"
+            "--controller",
+            metavar="ID",
+            help=f"May be repeated.  [default: {', '.join(DEFAULT_CONTROLLERS)};"
+            f" in space {', '.join(CONTROLLERS_IN_SPACE)}]",
         ),
     ] = None,
     artifact: ArtifactOption = None,
@@ -66,7 +71,11 @@ def track_command(
     ] = None,
     robot_id: Annotated[
         str | None,
-        typer.Option("--robot", metavar="ID", help="Which robot follows --trajectory.  [default: that of --artifact]"),
+        typer.Option(
+            "--robot",
+            metavar="ID",
+            help="Which robot follows --trajectory: an id, or a robot.toml.  [default: that of --artifact]",
+        ),
     ] = None,
     encoder_bits: EncoderOption = None,
     plant: PlantOption = "perturbed",
@@ -85,7 +94,7 @@ def track_command(
 ) -> None:
     """Run scenarios in closed loop: every controller, one table, figures of every run.
 
-    By default the default controller also runs once with 17-bit encoders, designed for them. Designs are kept in
+    By default that of an arm in a plane also runs with 17-bit encoders, designed for them. Designs are kept in
     out/cache and made again when anything they depend on changes.
 
     \b
@@ -107,9 +116,15 @@ def track_command(
         raise InputError("command line", "--robot", robot_id, "nothing without --trajectory: a scenario has its robot")
     if not experiments:
         raise InputError("command line", "SCENARIO", "nothing", "at least one scenario id or --trajectory FILE")
-    variants = _variants(given, controllers, encoder_bits, no_compensation)
+    planned = [
+        (
+            experiment,
+            _variants(given, controllers, encoder_bits, no_compensation, in_space=experiment.robot.in_space),
+        )
+        for experiment in experiments
+    ]
     session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
-    results = run_all(session, experiments, variants)
+    results = run_all(session, planned)
     if not json if figures is None else figures:
         draw_results(results, out, formats)
     if json:
@@ -120,13 +135,11 @@ def track_command(
         print_warnings(result)
 
 
-def run_all(
-    session: Session, experiments: Sequence[TrackingExperiment], variants: Sequence[Variant]
-) -> list[TrackResult]:
-    """Run every variant on every experiment; their rows are kept in ``results.json`` of the session's folder."""
+def run_all(session: Session, planned: Sequence[tuple[TrackingExperiment, Sequence[Variant]]]) -> list[TrackResult]:
+    """Run experiments, each with its variants; their rows are kept in ``results.json`` of the session's folder."""
     results = []
-    with progress(len(experiments) * len(variants)) as steps:
-        for experiment in experiments:
+    with progress(sum(len(variants) for _, variants in planned)) as steps:
+        for experiment, variants in planned:
             for variant in variants:
                 steps.begin(f"{experiment.name}: {variant.label}")
                 results.append(session.run(experiment, variant, steps))
@@ -135,10 +148,12 @@ def run_all(
     return results
 
 
-def default_variants() -> list[Variant]:
+def default_variants(*, in_space: bool = False) -> list[Variant]:
     """The controllers that run if none is chosen."""
     from quasilpv.experiments.result import Variant
 
+    if in_space:
+        return [Variant(name, ENCODER_BITS) for name in CONTROLLERS_IN_SPACE]
     coarse = Variant(DEFAULT_CONTROLLER, COARSE_ENCODER_BITS)
     return [*(Variant(name, ENCODER_BITS) for name in DEFAULT_CONTROLLERS), coarse]
 
@@ -154,26 +169,32 @@ def _given(path: Path, controllers: Sequence[str] | None, rate_hz: float | None,
     return read_artifact(path)
 
 
-def _follower(given: Artifact | None, robot_id: str | None) -> Robot:
+def _follower(given: Artifact | None, robot_id: str | None) -> AnyRobot:
     """The robot that follows a path: that of the controller, or the one that is named. None is assumed.
 
     Raises:
-        InputError: there is neither, they differ, or the registry does not know the robot.
+        InputError: there is neither, they differ, or nobody knows the robot.
     """
-    from quasilpv.experiments.track import robot_of
-    from quasilpv.systems.robots.registry import robot
+    from quasilpv.experiments.track import require_robot_of, robot_of
 
     if given is None and robot_id is None:
         raise InputError("command line", "--robot", "nothing", "who follows --trajectory, or --artifact FILE")
     if given is None:
-        return robot(str(robot_id))
+        return robot_named(str(robot_id))
+    if robot_id is not None and robot_id.endswith(".toml"):
+        return require_robot_of(given, robot_named(robot_id))
     if robot_id not in (None, given.robot.id):
         raise InputError("command line", "--robot", robot_id, f"{given.robot.id}, which --artifact is for")
     return robot_of(given)
 
 
 def _variants(
-    given: Artifact | None, controllers: Sequence[str] | None, encoder_bits: int | None, no_compensation: bool
+    given: Artifact | None,
+    controllers: Sequence[str] | None,
+    encoder_bits: int | None,
+    no_compensation: bool,
+    *,
+    in_space: bool,
 ) -> list[Variant]:
     from quasilpv.experiments.result import Variant
     from quasilpv.experiments.setup import variant_of
@@ -185,5 +206,6 @@ def _variants(
     if no_compensation:
         return [Variant(require_controller(name), bits, False) for name in controllers or [DEFAULT_CONTROLLER]]
     if not controllers and encoder_bits is None:
-        return default_variants()
-    return [Variant(require_controller(name), bits) for name in controllers or DEFAULT_CONTROLLERS]
+        return default_variants(in_space=in_space)
+    usual = CONTROLLERS_IN_SPACE if in_space else DEFAULT_CONTROLLERS
+    return [Variant(require_controller(name), bits) for name in controllers or usual]

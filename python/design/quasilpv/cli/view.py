@@ -18,6 +18,7 @@ from quasilpv.errors import InputError, TransportError
 if TYPE_CHECKING:
     from quasilpv.artifact import Artifact
     from quasilpv.systems.robots.mechanism import PlanarMechanism
+    from quasilpv.systems.robots.tree_mechanism import TreeMechanism
     from quasilpv.view.live import LiveMotion
     from quasilpv.view.page import Page
     from quasilpv.view.playback import Motion
@@ -77,7 +78,7 @@ def view_command(
     else:
         recorded = open_log(log or LAST, artifact)
         controller, motion = recorded.artifact, Motion.of_log(recorded)
-        mechanism = mechanism_of(recorded.scenario.plant)
+        mechanism = _in_a_plane(mechanism_of(recorded.scenario.plant), controller.name)
         title = f"{recorded.scenario.name}, {recorded.header.controller}"
     page = Page(Playback(title, motion, mechanism, _disturbance_unit(controller)), port, listener)
     if at is not None:
@@ -115,12 +116,23 @@ def _first_samples(listener: LiveMotion, url: str, timeout_s: float) -> Motion:
     return motion
 
 
+def _in_a_plane(mechanism: PlanarMechanism | TreeMechanism, source: str) -> PlanarMechanism:
+    from quasilpv.systems.robots.mechanism import PlanarMechanism
+
+    if not isinstance(mechanism, PlanarMechanism):
+        raise InputError(
+            source, "robot", f"{mechanism.joints} joints in space", "a robot in a plane, which the view shows"
+        )
+    return mechanism
+
+
 def _mechanism(controller: Artifact, scenario: Path | None) -> PlanarMechanism:
     from quasilpv.experiments.logged import mechanism_of
     from quasilpv.scenarios import read_scenario
-    from quasilpv.systems.robots.registry import robot
+    from quasilpv.systems.robots.registry import any_robot
 
-    return robot(controller.robot.id).model if scenario is None else mechanism_of(read_scenario(scenario).plant)
+    known = any_robot(controller.robot.id).model if scenario is None else mechanism_of(read_scenario(scenario).plant)
+    return _in_a_plane(known, controller.name)
 
 
 def _disturbance_unit(controller: Artifact) -> str:

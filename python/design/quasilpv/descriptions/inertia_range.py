@@ -16,8 +16,8 @@ import numpy as np
 from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.chain import ChainForm, ChainJoint, prove_chain
 from quasilpv.certificate.exact.matrices import matrix, rational
-from quasilpv.descriptions.spatial_robot import SpatialRobot
 from quasilpv.synthesis.chain_storages import InertiaPairing, Side, find_storages
+from quasilpv.systems.robots.spatial_robot import SpatialRobot
 from quasilpv.systems.robots.tree import KinematicTree
 
 SAMPLES = 2000

@@ -19,13 +19,13 @@ from pydantic import Field, model_validator
 from quasilpv.descriptions.described_tree import DescribedJoint, DescribedTree
 from quasilpv.descriptions.mjcf import read_mjcf
 from quasilpv.descriptions.safe_xml import read_xml, root_of
-from quasilpv.descriptions.spatial_robot import PayloadBody, SpatialJoint, SpatialRobot
 from quasilpv.descriptions.urdf import read_urdf
 from quasilpv.documents.programs import MAX_JOINTS
 from quasilpv.documents.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError, one_of
 from quasilpv.files import read_bytes
 from quasilpv.systems.robots.spatial import Placement
+from quasilpv.systems.robots.spatial_robot import PayloadBody, SpatialJoint, SpatialRobot
 from quasilpv.systems.robots.tree import JointKind
 
 Positive = Annotated[float, Field(gt=0)]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, Self, TypeAlias, get_args
 
 from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from quasilpv.documents.design_inertia import DesignInertia
-from quasilpv.documents.strict_model import FieldError, NonNegative, StrictModel
+from quasilpv.documents.strict_model import FieldError, NonNegative, Number, StrictModel
 from quasilpv.documents.tables import PolytopeTable, Vector
 
 Level: TypeAlias = Literal["acceleration", "torque"]
@@ -97,19 +98,45 @@ class ScheduledLaw(VelocityLaw):
 
 
 class OptionalMemberLaw(LawDocument):
-    """A law with a member that may be absent, but is not null: a document without it has no such member."""
+    """A law with members that may be absent, but are not null: a document without one has no such member."""
 
-    optional: ClassVar[tuple[str, str]]
-    """The member and what it is, for messages."""
+    optional: ClassVar[Mapping[str, str]]
+    """These members and what they are, for messages."""
 
     @model_validator(mode="after")
     def _refuse_null(self) -> Self:
-        name, meaning = self.optional
-        if getattr(self, name) is None and name in self.model_fields_set:
-            raise FieldError(name, "null", f"{meaning}, or no member of this name")
+        for name, meaning in self.optional.items():
+            if getattr(self, name) is None and name in self.model_fields_set:
+                raise FieldError(name, "null", f"{meaning}, or no member of this name")
         return self
 
     @model_serializer(mode="wrap")
     def _leave_out_absent(self, serialise: SerializerFunctionWrapHandler) -> dict[str, Any]:
         members: dict[str, Any] = serialise(self)
         return {name: member for name, member in members.items() if member is not None}
+
+
+class GravityLoad(StrictModel):
+    """What the last body of a tree carries for the torque of gravity only, about the frame of its joint."""
+
+    mass_kg: NonNegative
+    first_moment_kg_m: tuple[Number, Number, Number]
+
+
+class ChainLaw(OptionalMemberLaw):
+    """A law whose design inertia may be a tree, which may carry a load for its gravity only and needs no programs."""
+
+    optional: ClassVar[Mapping[str, str]] = {"gravity_load": "mass and first moment"}
+
+    gravity_load: GravityLoad | None = None
+
+    @property
+    def programs(self) -> tuple[str, ...]:
+        """None with a tree, whose recursion gives what the law needs."""
+        return self.PROGRAMS if isinstance(self.inertia, PolytopeTable) else ()
+
+    def check(self, joints: int) -> None:
+        """See `LawDocument.check`."""
+        if self.gravity_load is not None and isinstance(self.inertia, PolytopeTable):
+            expected = "none beside an inertia by vertices, whose gravity is a program"
+            raise FieldError("law.gravity_load", "a load", expected)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from quasilpv.documents.mechanism import LinkParameters
-from quasilpv.documents.plants import FiveBarPlant, Plant, SerialArmPlant, SpringDiscPlant
+from quasilpv.documents.plants import FiveBarPlant, Plant, SerialArmPlant, SpringDiscPlant, TreePlant
 from quasilpv.errors import InputError
 from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.run import Run
@@ -19,8 +19,14 @@ from quasilpv.systems.robots.fivebar import RhombicFiveBar
 from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
 from quasilpv.systems.robots.mechanism import PlanarMechanism
 from quasilpv.systems.robots.rolling_disc import RollingDisc
+from quasilpv.systems.robots.spatial import Placement, SpatialInertia
+from quasilpv.systems.robots.tree import JointKind, KinematicTree, TreeJoint
+from quasilpv.systems.robots.tree_mechanism import TreeMechanism
 from quasilpv.telemetry import RunLog
 from quasilpv.telemetry.recording import columns_of
+
+NO_LIMIT = 1e6
+"""Of a plant's joint, whose limits a scenario does not state."""
 
 
 def logged_result(log: RunLog) -> TrackResult:
@@ -58,7 +64,7 @@ def logged_run(log: RunLog) -> Run:
     return run_from_columns(columns, n, T)
 
 
-def mechanism_of(plant: Plant) -> PlanarMechanism:
+def mechanism_of(plant: Plant) -> PlanarMechanism | TreeMechanism:
     """The mechanism that the ``plant`` member of a scenario describes.
 
     Raises:
@@ -73,7 +79,30 @@ def mechanism_of(plant: Plant) -> PlanarMechanism:
         return RhombicFiveBar(FiveBarLinkage(name, _link(plant.active), _link(plant.passive), plant.gravity_m_s2))
     if isinstance(plant, SpringDiscPlant):
         return RollingDisc(name, **plant.model_dump(exclude={"kind", "label"}))
-    raise InputError("scenario", "plant.kind", name, "a mechanism in a plane, which is what can be drawn")
+    if isinstance(plant, TreePlant):
+        return _tree(plant)
+    raise InputError("scenario", "plant.kind", name, "a mechanism that is known here")
+
+
+def _tree(plant: TreePlant) -> TreeMechanism:
+    joints = tuple(
+        TreeJoint(
+            name=joint.name,
+            kind=JointKind(joint.kind),
+            placement=Placement(np.array(joint.rotation), np.array(joint.translation_m)),
+            axis=np.array(joint.axis),
+            inertia=SpatialInertia(joint.mass_kg, np.array(joint.first_moment_kg_m), np.array(joint.rotational_kg_m2)),
+            rotor_inertia_kg_m2=joint.rotor_inertia_kg_m2,
+            lower=-NO_LIMIT,
+            upper=NO_LIMIT,
+        )
+        for joint in plant.chain
+    )
+    return TreeMechanism(
+        KinematicTree(plant.label, joints, Placement.identity(), np.array(plant.gravity_m_s2)),
+        tuple(joint.friction_viscous_nm_s for joint in plant.chain),
+        tuple(joint.friction_coulomb_nm for joint in plant.chain),
+    )
 
 
 def _link(link: LinkParameters) -> Link:

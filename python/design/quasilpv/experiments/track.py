@@ -28,7 +28,8 @@ from quasilpv.scenarios import (
     write_scenario,
 )
 from quasilpv.systems.robots.mechanism import PlanarMechanism
-from quasilpv.systems.robots.registry import Robot, robots
+from quasilpv.systems.robots.registry import AnyRobot, all_robots
+from quasilpv.systems.robots.tree_mechanism import TreeMechanism
 from quasilpv.telemetry import LOG_NAME, Mode, RunHeader
 from quasilpv.telemetry.recording import RunDocuments, write_run
 from quasilpv.trajectories import write_trajectory
@@ -37,24 +38,35 @@ TRAJECTORY_NAME = "trajectory.json"
 SCENARIO_NAME = "scenario.json"
 
 
-def robot_of(artifact: Artifact) -> Robot:
+def robot_of(artifact: Artifact) -> AnyRobot:
     """The robot of the registry that an artifact was designed for.
 
     Raises:
         InputError: the registry does not know it, or knows another one by this name.
     """
-    known = {entry.id: entry for entry in robots()}
+    known = {entry.id: entry for entry in all_robots()}
     source = known.get(artifact.robot.id)
     if source is None:
         expected = f"one of the registry, {', '.join(known)}, or the robot itself beside the artifact"
         raise InputError(artifact.name, "robot.id", artifact.robot.id, expected)
+    return require_robot_of(artifact, source)
+
+
+def require_robot_of(artifact: Artifact, source: AnyRobot) -> AnyRobot:
+    """The robot, if an artifact was designed for it.
+
+    Raises:
+        InputError: another robot, or another set of payloads.
+    """
+    if artifact.robot.id != source.id:
+        raise InputError(artifact.name, "robot.id", artifact.robot.id, source.id)
     own = read_mechanism(source.model.parameters_document(), source=source.id)
     for field, same in (
         ("robot.parameters", artifact.mechanism == own),
         ("payloads", canonical_json(artifact.payloads) == canonical_json(source.payloads.to_document())),
     ):
         if not same:
-            expected = f"those of {source.id} in the registry, or the robot itself beside the artifact"
+            expected = f"those of {source.id} as it is known here, or the robot itself beside the artifact"
             raise InputError(artifact.name, field, "others", expected)
     return source
 
@@ -213,7 +225,7 @@ def summarise(run: Run, setup: RunSetup) -> TrackResult:
 def summarise_as(
     run: Run,
     name: str,
-    mechanism: PlanarMechanism,
+    mechanism: PlanarMechanism | TreeMechanism,
     artifact: Artifact,
     *,
     plant: str,
@@ -230,7 +242,8 @@ def summarise_as(
     """
 
     def tool_position(angle: FloatArray) -> FloatArray:
-        return np.array([mechanism.forward_kinematics(row)[:2] for row in angle])
+        coordinates = 3 if isinstance(mechanism, TreeMechanism) else 2
+        return np.array([mechanism.forward_kinematics(row)[:coordinates] for row in angle])
 
     actual, wanted = tool_position(run.true_angle_rad), tool_position(run.reference_angle_rad)
     runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()), artifact.name)
@@ -240,7 +253,7 @@ def summarise_as(
         rate_hz=round(1.0 / artifact.sample_period_s, 6),
         plant=plant,
         velocity_noise_rad_s=sensors.velocity_noise_rad_s,
-        metrics=compute_metrics(run, actual - wanted),
+        metrics=compute_metrics(run, actual - wanted, has_premises=bool(artifact.programs)),
         worst_growth_rate_per_s=worst_growth_rate(artifact),
         run=run,
         tool_position_m=actual,

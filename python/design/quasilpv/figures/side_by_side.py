@@ -25,11 +25,11 @@ from quasilpv.figures.style import (
     new_figure,
     style,
 )
-from quasilpv.figures.tracking import exaggeration, label_time, plot_disturbance, plot_joints
+from quasilpv.figures.tracking import AXES, exaggeration, label_time, plane_of, plot_disturbance, plot_joints
 
 
 def tracking_columns(results: Mapping[str, TrackResult], title: str) -> Figure:
-    """Path of the tool with its error exaggerated, and the error along X and Y over time.
+    """Path of the tool with its error exaggerated, and the error along every axis over time.
 
     Args:
         results: by what their columns are called, at least one.
@@ -37,12 +37,13 @@ def tracking_columns(results: Mapping[str, TrackResult], title: str) -> Figure:
     """
     with style():
         figure = new_figure(5.8, title)
-        grid = figure.subplots(3, len(results), squeeze=False, height_ratios=(1.5, 1.0, 1.0))
+        count = next(iter(results.values())).tool_position_m.shape[1]
+        grid = figure.subplots(1 + count, len(results), squeeze=False, height_ratios=(1.5, *[1.0] * count))
         for column, (label, result) in zip(grid.T, results.items(), strict=True):
             _path(column[0], result, label)
             error = result.tool_position_m - result.reference_position_m
             unit = length_unit(float(np.abs(error).max()))
-            for axes, shown, name in zip(column[1:], error.T * unit.factor, "XY", strict=True):
+            for axes, shown, name in zip(column[1:], error.T * unit.factor, AXES, strict=False):
                 axes.plot(result.run.time_s, shown, color=BLUE, linewidth=0.6)
                 axes.set_ylabel(f"{name} error ({unit.name})")
                 axes.set_title(f"rms {np.sqrt(np.mean(shown**2)):.3g}, max {np.abs(shown).max():.3g} {unit.name}")
@@ -127,15 +128,16 @@ def disturbance_estimates(results: Mapping[str, TrackResult], joint: int, title:
 
 
 def _path(axes: Axes, result: TrackResult, label: str) -> None:
-    reference = result.reference_position_m
-    error = result.tool_position_m - reference
+    plane = plane_of(result.reference_position_m)
+    reference = result.reference_position_m[:, plane]
+    error = result.tool_position_m[:, plane] - reference
     factor = exaggeration(error, reference)
     axes.plot(*reference.T, color=REFERENCE_COLOUR, linewidth=2.0, label="reference")
     axes.plot(*(reference + factor * error).T, color=VERMILION, linewidth=0.8, label="tool, error times the factor")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_title(f"{label}\nerror × {factor:g}")
-    axes.set_xlabel("X (m)")
-    axes.set_ylabel("Y (m)")
+    axes.set_xlabel(f"{AXES[plane[0]]} (m)")
+    axes.set_ylabel(f"{AXES[plane[1]]} (m)")
 
 
 def _common_scale(results: Mapping[str, TrackResult]) -> list[float]:

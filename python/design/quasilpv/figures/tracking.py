@@ -23,20 +23,24 @@ from quasilpv.figures.style import (
     style,
 )
 
+AXES = "XYZ"
+"""Of the base."""
+
 
 def plot_path(axes: Axes, result: TrackResult) -> None:
     """Draw the tool's path in the plane over its reference, m."""
-    axes.plot(*result.reference_position_m.T, color=REFERENCE_COLOUR, linewidth=2.2, label="reference")
-    axes.plot(*result.tool_position_m.T, color=BLUE, linewidth=1.0, label="tool")
+    plane = plane_of(result.reference_position_m)
+    axes.plot(*result.reference_position_m[:, plane].T, color=REFERENCE_COLOUR, linewidth=2.2, label="reference")
+    axes.plot(*result.tool_position_m[:, plane].T, color=BLUE, linewidth=1.0, label="tool")
     axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel("X (m)")
-    axes.set_ylabel("Y (m)")
+    axes.set_xlabel(f"{AXES[plane[0]]} (m)")
+    axes.set_ylabel(f"{AXES[plane[1]]} (m)")
     legend_above(axes)
 
 
 def plot_error(axes: Axes, result: TrackResult) -> None:
     """Draw the distance of the tool from its reference over time."""
-    distance = np.hypot(*(result.tool_position_m - result.reference_position_m).T)
+    distance = np.linalg.norm(result.tool_position_m - result.reference_position_m, axis=1)
     unit = length_unit(float(distance.max()))
     axes.plot(result.run.time_s, distance * unit.factor, color=BLUE, linewidth=0.8)
     axes.set_ylabel(f"distance from the reference ({unit.name})")
@@ -51,13 +55,21 @@ def plot_torque(axes: Axes, result: TrackResult) -> None:
     label_time(axes, result.run.time_s)
 
 
+def plane_of(points: FloatArray) -> list[int]:
+    """The two axes along which points (N, 2) or (N, 3) extend most, in their order."""
+    extent = np.ptp(points, axis=0)
+    return sorted(np.argsort(-extent, kind="stable")[:2].tolist())
+
+
 def path_figure(result: TrackResult) -> Figure:
     """The tool's path in the plane over its reference, and the same path with the error exaggerated.
 
     The right panel draws reference + factor * (actual - reference): the factor, a round number printed in the legend,
-    makes the largest deviation about a tenth of the path's extent, so that micrometres are seen where they happen.
+    makes the largest deviation about a tenth of the path's extent, so that micrometres are seen where they happen. A
+    path in space is seen along the axis of the base in which it extends least.
     """
-    reference, actual = result.reference_position_m, result.tool_position_m
+    plane = plane_of(result.reference_position_m)
+    reference, actual = result.reference_position_m[:, plane], result.tool_position_m[:, plane]
     error = actual - reference
     factor = exaggeration(error, reference)
     with style():
@@ -67,27 +79,28 @@ def path_figure(result: TrackResult) -> Figure:
             axes.plot(*reference.T, color=REFERENCE_COLOUR, linewidth=2.2, label="reference")
             axes.plot(*reference[0], marker="o", color=REFERENCE_COLOUR, markersize=4)
             axes.set_aspect("equal", adjustable="box")
-            axes.set_xlabel("X (m)")
+            axes.set_xlabel(f"{AXES[plane[0]]} (m)")
         left.plot(*actual.T, color=BLUE, linewidth=1.0, label="tool")
         right.plot(*(reference + factor * error).T, color=VERMILION, label=f"tool, error × {factor:g}")
-        left.set_ylabel("Y (m)")
+        left.set_ylabel(f"{AXES[plane[1]]} (m)")
         for axes in (left, right):
             legend_above(axes)
         return figure
 
 
 def error_figure(result: TrackResult) -> Figure:
-    """Position error of the tool along X and Y over time, with its rms and maximum."""
+    """Position error of the tool along every axis over time, with its rms and maximum."""
     error = result.tool_position_m - result.reference_position_m
     unit = length_unit(float(np.max(np.abs(error))))
     with style():
-        figure = new_figure(3.8, f"{result.title}: position error of the tool")
-        for column, (axes, name) in enumerate(zip(figure.subplots(2, 1, sharex=True), "XY", strict=True)):
+        count = error.shape[1]
+        figure = new_figure(1.9 * count, f"{result.title}: position error of the tool")
+        for column, axes in enumerate(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]):
             shown = error[:, column] * unit.factor
             rms, peak = np.sqrt(np.mean(shown**2)), np.max(np.abs(shown))
             axes.axhspan(-rms, rms, color="#e8eef4", linewidth=0.0)
             axes.plot(result.run.time_s, shown, color=BLUE, linewidth=0.8)
-            axes.set_ylabel(f"{name} error ({unit.name})")
+            axes.set_ylabel(f"{AXES[column]} error ({unit.name})")
             axes.set_title(f"rms {rms:.3g} {unit.name} (shaded), largest {peak:.3g} {unit.name}")
         label_time(axes, result.run.time_s)
         return figure

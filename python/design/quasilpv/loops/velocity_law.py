@@ -48,6 +48,10 @@ class VelocityLaw:
         """Angles and speeds."""
         return 2
 
+    @property
+    def _integrates(self) -> bool:
+        return bool(np.any(self.integral))
+
     def step(self, theta: FloatArray, omega: FloatArray, state: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
         """One sample (see `FrozenLaw`)."""
         T = self.sample_period_s
@@ -55,7 +59,7 @@ class VelocityLaw:
         pole = math.exp(-T / self.filter_time_constant_s) if self.filter_time_constant_s > 0.0 else 0.0
         filtered = pole * filtered + (1.0 - pole) * omega
         command = T**3 * self.integral @ integral - T**2 * self.proportional @ theta - T * self.derivative @ filtered
-        following = [filtered, integral - theta]
+        following = [filtered, integral - theta if self._integrates else 0.0 * theta]  # what nothing reads is not kept
         if self.observer_bandwidth_rad_s > 0.0:
             zeta, observer_pole = state[:, 2], math.exp(-self.observer_bandwidth_rad_s * T)
             gain = 1.0 - observer_pole

@@ -121,6 +121,7 @@ def outcome(loop: ClosedLoop) -> Outcome:
     if loop.observer == "without disturbance":
         artifact = without_disturbance_states(artifact)
     if loop.plant == "chapter-III":
+        assert isinstance(experiment.robot, Robot)
         experiment = replace(experiment, robot=chapter_three(experiment.robot))
     plant: Literal["nominal", "perturbed"] = "perturbed" if loop.plant == "perturbed" else "nominal"
     variant = Variant(loop.controller, loop.sensors.encoder_bits, loop.observer == "whole")

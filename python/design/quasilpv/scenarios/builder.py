@@ -6,12 +6,12 @@ from typing import Literal
 
 from quasilpv.errors import InputError
 from quasilpv.scenarios.schema import IdaIntegrator, Rk4Integrator, Scenario, Sensors, SineTorque, Vector
-from quasilpv.systems.robots.registry import Robot
+from quasilpv.systems.robots.registry import AnyRobot
 from quasilpv.trajectories import Trajectory
 
 
 def build_scenario(
-    robot: Robot,
+    robot: AnyRobot,
     trajectory: Trajectory,
     *,
     plant: Literal["nominal", "perturbed"] = "perturbed",

@@ -6,16 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from quasilpv.scenarios.schema import SineTorque, Vector
 from quasilpv.systems.robots.arm_parameters import OperatingDomain
-from quasilpv.systems.robots.registry import Robot
-from quasilpv.trajectories import Trajectory, plan, read_path
-from quasilpv.trajectories.planned import Kinematics
+from quasilpv.systems.robots.registry import AnyRobot
+from quasilpv.systems.robots.spatial_robot import SpatialRobot
+from quasilpv.trajectories import Trajectory, plan, plan_in_space, read_path, read_spatial_path
 
-Planner: TypeAlias = Callable[[Kinematics, OperatingDomain | None], Trajectory]
-"""From a robot's kinematics and operating domain to a reference."""
+Planner: TypeAlias = Callable[[Any, OperatingDomain | None], Trajectory]
+"""From a robot's model and operating domain to a reference."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class TrackingExperiment:
     """
 
     name: str
-    robot: Robot
+    robot: AnyRobot
     reference: Trajectory | Planner
     external_torque: tuple[SineTorque, ...] = ()
     initial_angle_rad: Vector | None = None
@@ -41,13 +41,16 @@ class TrackingExperiment:
     summary: str = ""
 
     @classmethod
-    def from_path_file(cls, path: Path | str, robot: Robot) -> TrackingExperiment:
+    def from_path_file(cls, path: Path | str, robot: AnyRobot) -> TrackingExperiment:
         """The experiment in which a robot follows the task-space path of a file.
 
         Raises:
             InputError: the file is not a path, or the path is unreachable, singular, or outside the modelling box.
         """
-        trajectory = plan(robot.model, read_path(path), robot.domain, source=str(path))
+        if isinstance(robot, SpatialRobot):
+            trajectory = plan_in_space(robot.tree, read_spatial_path(path), robot.domain, source=str(path))
+        else:
+            trajectory = plan(robot.model, read_path(path), robot.domain, source=str(path))
         return cls(trajectory.name, robot, trajectory)
 
     @cached_property
@@ -57,6 +60,6 @@ class TrackingExperiment:
             return self.reference
         return self.reference(self.robot.model, self.robot.domain)
 
-    def by(self, robot: Robot) -> TrackingExperiment:
+    def by(self, robot: AnyRobot) -> TrackingExperiment:
         """The same tracked by another robot."""
         return replace(self, robot=robot)

@@ -15,8 +15,8 @@ from quasilpv.errors import look_up
 from quasilpv.scenarios.experiment import Planner, TrackingExperiment
 from quasilpv.scenarios.schema import sine_torques
 from quasilpv.synthesis.actuator_demand import Motion
-from quasilpv.systems.robots.registry import Robot, robot
-from quasilpv.trajectories import fivebar_spiral, rest, serial_circle, serial_square
+from quasilpv.systems.robots.registry import AnyRobot, any_robot, robot
+from quasilpv.trajectories import fivebar_spiral, rest, serial_circle, serial_square, ur5_circle, ur5_square
 
 EXTERNAL_TORQUE = sine_torques((450.0, 15.0), (375.0, 15.0), (300.0, 15.0))
 """The disturbance of Dehak 2022 (III.53): joint torques, added to the control torque as they are."""
@@ -41,6 +41,11 @@ def _spiral(name: str, disturbance: str, *terms: tuple[float, float]) -> Trackin
     return TrackingExperiment(name, robot("fivebar"), fivebar_spiral, sine_torques(*terms), summary=summary)
 
 
+def _in_space(name: str, summary: str, planner: Planner) -> TrackingExperiment:
+    """A path of the UR5 with its load; only friction disturbs it."""
+    return TrackingExperiment(name, any_robot("ur5"), planner, summary=summary)
+
+
 def tracking_experiments() -> tuple[TrackingExperiment, ...]:
     """Return all tracking experiments, in a fixed order; none is planned before its trajectory is asked for."""
     return (
@@ -60,6 +65,8 @@ def tracking_experiments() -> tuple[TrackingExperiment, ...]:
             initial_speed_rad_s=(5.0,),
             summary="the disc comes to rest from x_1 = -5 m, x_2 = 10 m/s (Dehak 2022, fig. III.4)",
         ),
+        _in_space("ur5-square", "the UR5 draws an upright square of 0.3 m in 4 s", ur5_square),
+        _in_space("ur5-circle", "the UR5 draws an upright circle of 0.3 m in 4 s", ur5_circle),
     )
 
 
@@ -73,7 +80,7 @@ def tracking_experiment(name: str) -> TrackingExperiment:
     return look_up(known, name, "scenarios", "scenario")
 
 
-def motions_of(source: Robot, sample_period_s: float = 0.02) -> tuple[Motion, ...]:
+def motions_of(source: AnyRobot, sample_period_s: float = 0.02) -> tuple[Motion, ...]:
     """What the registered experiments ask of a robot: their references and the peaks of their external torques."""
     motions = []
     for experiment in tracking_experiments():

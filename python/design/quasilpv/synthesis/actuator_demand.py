@@ -21,10 +21,12 @@ from quasilpv.arrays import FloatArray
 from quasilpv.certificate import LAWS
 from quasilpv.loops.loop_grid import configurations
 from quasilpv.synthesis.tracking_design import TrackingDesign
-from quasilpv.systems.robots.registry import Robot
+from quasilpv.systems.robots.registry import AnyRobot
+from quasilpv.systems.robots.spatial_robot import SpatialRobot
 
 PAYLOAD_FRACTIONS = (0.0, 0.5, 1.0)
 POSTURES = 200
+SEED = 20220315
 INCREMENT_FACTOR = 2.0
 """So many times the predicted rms increment must fit into the slew limit of a sample."""
 
@@ -49,17 +51,17 @@ class Motion:
     disturbance_rate_nm_per_s: FloatArray
     sample_period_s: float
 
-    def torques(self, robot: Robot, fraction: float) -> FloatArray:
+    def torques(self, robot: AnyRobot, fraction: float) -> FloatArray:
         """What the reference itself takes with a payload, (N, n), N m."""
         plant = robot.with_payload_fraction(fraction)
         rows = zip(self.angle_rad, self.speed_rad_s, self.acceleration_rad_s2, strict=True)
         return np.array([plant.inverse_dynamics(*row) for row in rows])
 
 
-MotionsOf = Callable[[Robot], Sequence[Motion]]
+MotionsOf = Callable[[AnyRobot], Sequence[Motion]]
 
 
-def no_motions(_: Robot) -> Sequence[Motion]:
+def no_motions(_: AnyRobot) -> Sequence[Motion]:
     """Ask for nothing but standing still."""
     return ()
 
@@ -93,9 +95,13 @@ def unmet_demands(design: TrackingDesign, motions_of: MotionsOf = no_motions) ->
 _NOISE = f"{INCREMENT_FACTOR:g} times the predicted rms increment"
 
 
-def largest_gravity(robot: Robot) -> FloatArray:
-    """Largest gravity torque of each joint over a grid of the operating domain and payloads, (n,), N m."""
-    postures = configurations(robot.domain.angle_rad, POSTURES, every_joint=True)
+def largest_gravity(robot: AnyRobot) -> FloatArray:
+    """Largest gravity torque of each joint over postures of the operating domain and payloads, (n,), N m."""
+    if isinstance(robot, SpatialRobot):
+        low, high = np.array(robot.domain.angle_rad).T  # too many joints for a grid
+        postures = np.random.default_rng(SEED).uniform(low, high, (POSTURES, len(low)))
+    else:
+        postures = configurations(robot.domain.angle_rad, POSTURES, every_joint=True)
     plants = [robot.with_payload_fraction(fraction) for fraction in PAYLOAD_FRACTIONS]
     return np.asarray(np.max([np.abs(plant.gravity(theta)) for plant in plants for theta in postures], axis=0))
 
@@ -103,10 +109,13 @@ def largest_gravity(robot: Robot) -> FloatArray:
 def predicted_increments(design: TrackingDesign) -> FloatArray:
     """Rms torque increment of each joint from sensor noise, (n,), N m; zero if the design predicts none.
 
-    A design predicts the norm over all joints. The noise of the joints is independent and goes through gains in
-    proportion to the inertia, so that the joints share it as the norms of the rows of M do.
+    A design for a robot in space predicts the largest share of a joint's limit; others predict the norm over all
+    joints. The noise of the joints is independent and goes through gains in proportion to the inertia, so that the
+    joints share it as the norms of the rows of M do.
     """
     robot = design.robot
+    if isinstance(robot, SpatialRobot):
+        return np.array(robot.limits.torque_nm) * float(design.report.get("predicted_torque_activity", 0.0))
     total = float(design.report.get("predicted_torque_increment_nm", 0.0))
     postures = configurations(robot.domain.angle_rad, POSTURES, every_joint=not robot.model.turns_as_one)
     largest = max(

@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from quasilpv.errors import look_up
+from quasilpv.errors import InputError, look_up
 from quasilpv.progress import Progress
 from quasilpv.synthesis.specification import Specification
 
 if TYPE_CHECKING:
     from quasilpv.synthesis.tracking_design import TrackingDesign
-    from quasilpv.systems.robots.registry import Robot
+    from quasilpv.systems.robots.registry import AnyRobot
 
 
 @dataclass(frozen=True)
@@ -27,16 +27,22 @@ class ControllerKind:
         summary: one line for a listing.
         function: from robot, specification and progress to a design: ``module.name`` in this room.
         rate_hz: sample rate if nobody asks for another.
+        in_space: the same function for robots in space; None if there is none.
     """
 
     summary: str
     function: str
     rate_hz: float = 1000.0
+    in_space: str | None = None
 
-    def design(self, robot: Robot, specification: Specification, progress: Progress) -> TrackingDesign:
+    def design(self, robot: AnyRobot, specification: Specification, progress: Progress) -> TrackingDesign:
         """Design it; see `synthesise`."""
-        module, _, name = self.function.rpartition(".")
-        design: Callable[[Robot, Specification, Progress], TrackingDesign]
+        function = self.in_space if robot.in_space else self.function
+        if function is None:
+            known = ", ".join(name for name, kind in CONTROLLERS.items() if kind.in_space is not None)
+            raise InputError(robot.id, "controller", self.summary, f"one for robots in space: {known}")
+        module, _, name = function.rpartition(".")
+        design: Callable[[Any, Specification, Progress], TrackingDesign]
         design = getattr(import_module(f"quasilpv.synthesis.{module}"), name)
         return design(robot, specification, progress)
 
@@ -52,8 +58,16 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
         "computed torque with a disturbance observer (Mohammadi et al. 2013), measured speeds",
         "baselines.printed.computed_torque_with_observer",
     ),
-    "pid-tuned": ControllerKind("pid, tuned as dob-acceleration is", "baselines.tuned.pid_tuned"),
-    "ctc-tuned": ControllerKind("ctc, tuned as dob-acceleration is", "baselines.tuned.computed_torque_tuned"),
+    "pid-tuned": ControllerKind(
+        "pid, in space PID with gravity, tuned as dob-acceleration is",
+        "baselines.tuned.pid_tuned",
+        in_space="baselines.in_space.pid_gravity_tuned",
+    ),
+    "ctc-tuned": ControllerKind(
+        "ctc, tuned as dob-acceleration is",
+        "baselines.tuned.computed_torque_tuned",
+        in_space="baselines.in_space.computed_torque_tuned",
+    ),
     "ctc-dob-tuned": ControllerKind(
         "ctc-dob, tuned as dob-acceleration is", "baselines.tuned.computed_torque_with_observer_tuned"
     ),
@@ -96,6 +110,7 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
     "dob-acceleration": ControllerKind(
         "disturbance-observer tracking at the acceleration level, positions only (default)",
         "acceleration.law.acceleration_law",
+        in_space="acceleration.tree_law.tree_acceleration_law",
     ),
 }
 

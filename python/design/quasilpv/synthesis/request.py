@@ -9,7 +9,11 @@ from quasilpv.synthesis.registry import DEFAULT_CONTROLLER, controller_kind
 from quasilpv.synthesis.specification import Specification
 
 if TYPE_CHECKING:
-    from quasilpv.systems.robots.registry import Robot
+    from quasilpv.systems.robots.registry import AnyRobot
+
+
+ACTIVITY_IN_SPACE = 0.02
+"""Default torque activity of robots in space, a share of each joint's limit."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +27,7 @@ class DesignRequest:
         compensated: False to leave the observed disturbance out of the torque, see `without_compensation`.
     """
 
-    robot: Robot
+    robot: AnyRobot
     controller: str
     specification: Specification
     compensated: bool = True
@@ -31,7 +35,7 @@ class DesignRequest:
     @classmethod
     def of(
         cls,
-        robot: Robot | str,
+        robot: AnyRobot | str,
         controller: str = DEFAULT_CONTROLLER,
         specification: Specification | None = None,
         *,
@@ -49,14 +53,14 @@ class DesignRequest:
         Raises:
             InputError: unknown robot or controller.
         """
-        from quasilpv.systems.robots.registry import robot as known  # noqa: PLC0415 -- help pages ask for no robot
+        from quasilpv.systems.robots.registry import any_robot  # noqa: PLC0415 -- help pages ask for no robot
 
-        source = known(robot) if isinstance(robot, str) else robot
+        source = any_robot(robot) if isinstance(robot, str) else robot
         return cls(source, controller, specification or specification_for(source, controller), compensated)
 
 
 def specification_for(
-    robot: Robot,
+    robot: AnyRobot,
     controller: str = DEFAULT_CONTROLLER,
     *,
     rate_hz: float | None = None,
@@ -66,7 +70,8 @@ def specification_for(
 ) -> Specification:
     """The specification for these numbers; what is not given, and exact angles (0 bits), keep their default.
 
-    The default rate is the controller's own, the frequency of disturbances the robot's.
+    The default rate is the controller's own, the frequency of disturbances the robot's; the delay to tolerate is at
+    least the robot's own. For a robot in space the default torque activity is `ACTIVITY_IN_SPACE`.
 
     Args:
         robot: what is designed for.
@@ -76,10 +81,13 @@ def specification_for(
     Raises:
         InputError: an unknown controller, or a number out of range.
     """
+    rate = controller_kind(controller).rate_hz if rate_hz is None else rate_hz
+    activity = ACTIVITY_IN_SPACE if robot.in_space else Specification.torque_activity
     return Specification(
-        rate_hz=controller_kind(controller).rate_hz if rate_hz is None else rate_hz,
+        rate_hz=rate,
+        delay_samples=max(Specification.delay_samples, robot.delay_s[1] * rate),
         encoder_bits=encoder_bits or Specification.encoder_bits,
         margin_spare=Specification.margin_spare if margin_spare is None else margin_spare,
-        torque_activity=Specification.torque_activity if torque_activity is None else torque_activity,
+        torque_activity=activity if torque_activity is None else torque_activity,
         disturbance_frequency_rad_s=robot.disturbance_frequency_rad_s,
     )

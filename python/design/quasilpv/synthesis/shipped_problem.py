@@ -55,9 +55,14 @@ def _sampled_chains(document: Mapping[str, Any]) -> dict[str, Problem]:
     period, witness = document["sample_period_s"], document["witness"]
     bandwidths = {name: witness[name]["bandwidth_rad_s"] for name in ("feedback", "observer")}
     return {
-        "feedback": feedback_problem(bandwidths["feedback"], period)[0],
+        "feedback": feedback_problem(bandwidths["feedback"], period, integral=_has_integral(document))[0],
         "observer": observer_problem(bandwidths["observer"], period)[0],
     }
+
+
+def _has_integral(document: Mapping[str, Any]) -> bool:
+    """Whether the feedback of an acceleration-level law has integral action."""
+    return float(document["law"]["feedback"]["ki"]) != 0.0
 
 
 def _torque_level(document: Mapping[str, Any]) -> dict[str, Problem]:

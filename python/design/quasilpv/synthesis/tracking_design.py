@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from quasilpv.polytopes import BlockPolytope
-from quasilpv.systems.robots.registry import Robot
+from quasilpv.systems.robots.registry import AnyRobot, Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class TrackingDesign:
     """
 
     controller: str
-    robot: Robot
+    robot: AnyRobot
     sample_period_s: float
     law: Mapping[str, Any]
     expressions: Mapping[str, tuple[sp.Expr, ...]]

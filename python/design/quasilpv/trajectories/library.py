@@ -12,10 +12,12 @@ import math
 import numpy as np
 
 from quasilpv.systems.robots.arm_parameters import OperatingDomain
+from quasilpv.systems.robots.tree_mechanism import TreeMechanism
 from quasilpv.trajectories.document import Trajectory
 from quasilpv.trajectories.paths import ArcSegment, LineSegment, Segment, SpiralSegment, TaskPath
 from quasilpv.trajectories.planned import Kinematics
-from quasilpv.trajectories.planning import plan
+from quasilpv.trajectories.planning import plan, plan_in_space
+from quasilpv.trajectories.spatial_paths import SpatialArc, SpatialLine, SpatialPath, SpatialSegment
 
 SQUARE = TaskPath(
     name="serial-square",
@@ -44,6 +46,31 @@ SPIRAL = TaskPath(
 """Three turns of a spiral from (0, -0.22) outwards to a radius of 0.06 m, in 5 s."""
 
 
+UR5_START_RAD = (0.2, -1.7, 2.0, -1.87, -1.5708, 0.3)
+"""Elbow up, the flange down, in front of the base."""
+
+UR5_SQUARE = SpatialPath(
+    name="ur5-square",
+    start_posture_rad=UR5_START_RAD,
+    segments=tuple(
+        SpatialSegment(line=SpatialLine(by=by, duration_s=1.0))
+        for by in ((0.0, 0.3, 0.0), (0.0, 0.0, 0.3), (0.0, -0.3, 0.0), (0.0, 0.0, -0.3))
+    ),
+)
+"""An upright square of side 0.3 m with the orientation held, 1 s a side."""
+
+UR5_CIRCLE = SpatialPath(
+    name="ur5-circle",
+    start_posture_rad=UR5_START_RAD,
+    segments=(
+        SpatialSegment(
+            arc=SpatialArc(centre_by=(0.0, 0.15, 0.0), axis=(-1.0, 0.0, 0.0), angle_rad=2.0 * math.pi, duration_s=4.0)
+        ),
+    ),
+)
+"""An upright circle of diameter 0.3 m with the orientation held, in 4 s: up to 0.52 m/s."""
+
+
 def serial_square(arm: Kinematics, domain: OperatingDomain | None = None) -> Trajectory:
     """Return the trajectory of the 3-DoF arm along ``SQUARE``.
 
@@ -69,6 +96,24 @@ def fivebar_spiral(robot: Kinematics, domain: OperatingDomain | None = None) -> 
         InputError: as ``plan``.
     """
     return plan(robot, SPIRAL, domain)
+
+
+def ur5_square(robot: TreeMechanism, domain: OperatingDomain | None = None) -> Trajectory:
+    """Return the trajectory of the UR5 along ``UR5_SQUARE``.
+
+    Raises:
+        InputError: as ``plan_in_space``.
+    """
+    return plan_in_space(robot.tree, UR5_SQUARE, domain)
+
+
+def ur5_circle(robot: TreeMechanism, domain: OperatingDomain | None = None) -> Trajectory:
+    """Return the trajectory of the UR5 along ``UR5_CIRCLE``.
+
+    Raises:
+        InputError: as ``plan_in_space``.
+    """
+    return plan_in_space(robot.tree, UR5_CIRCLE, domain)
 
 
 def rest(name: str, joints: int, duration_s: float) -> Trajectory:

@@ -24,16 +24,28 @@ struct TreeJoint {
   double rotor_inertia_kg_m2 = 0.0;   ///< reflected to the joint
 };
 
+/// What the last body of a chain carries for the torque of gravity only.
+struct GravityLoad {
+  double mass_kg = 0.0;
+  Eigen::Vector3d first_moment_kg_m = Eigen::Vector3d::Zero();  ///< in the last joint's frame
+};
+
 /// The chain, base to tip; 1 to 7 joints.
 struct KinematicTree {
   std::vector<TreeJoint> joints;
   Eigen::Vector3d gravity_m_s2;  ///< in the axes of the base
+  GravityLoad gravity_load = {};
 };
 
 /// The members `gravity_m_s2` and `joints` of a document of kind `tree`, strictly: rotations are rotations, axes have
-/// length 1, inertias are not negative. Members that do not concern the motion (`TreeJointExtras`) are left to the
-/// caller. INIT-ONLY. Throws InputError.
+/// length 1, inertias are not negative. Other members are left to the caller. INIT-ONLY. Throws InputError.
 KinematicTree read_tree(const Field& field);
+
+/// The same of a document that has no other members. INIT-ONLY. Throws InputError.
+KinematicTree read_bare_tree(const Field& field);
+
+/// The members `mass_kg` and `first_moment_kg_m` of a document, and no others. INIT-ONLY. Throws InputError.
+GravityLoad read_gravity_load(const Field& field);
 
 /// Angles or torques of all joints.
 using TreeVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxJoints, 1>;
@@ -83,6 +95,7 @@ class TreeDynamics {
 
   std::array<Joint, kMaxJoints> joint_;
   Eigen::Vector3d gravity_;
+  GravityLoad load_;
   int joints_;
 };
 

@@ -6,16 +6,29 @@
 
 #include "quasilpv/block_polytope.hpp"
 #include "quasilpv/control_law.hpp"
+#include "quasilpv/kinematic_tree.hpp"
 #include "quasilpv/program.hpp"
 #include "quasilpv/step.hpp"
 
 namespace quasilpv {
 
-/// What every law knows of the robot: z(y), M_n(z) in kg m^2, G(y) in N m.
+/// What every law knows of the robot, M_n in kg m^2 and G in N m: a table M_n(z) over premises z(y) and a program G(y),
+/// or a chain of bodies, of which one recursion gives both.
 struct DesignModel {
   Program premises;
   BlockPolytope inertia;
   Program gravity;
+  std::shared_ptr<const TreeDynamics> tree;  ///< null: the three before, which are empty otherwise
+
+  /// G(y). RT-SAFE (bounded, no allocation, no lock, no throw). \param[out] torque one value per joint.
+  void gravity_at(const double* angle, double* torque) const noexcept {
+    if (tree) {
+      const JointArray none{};
+      tree->torque_at_rest(angle, none.data(), torque);
+    } else {
+      gravity.evaluate(ProgramInput{angle}, torque);
+    }
+  }
 };
 
 /// A proved lower bound of the Lyapunov function of a moving robot (docs/concepts/motion.md), rad^2: the trace of

@@ -37,7 +37,7 @@ class SafeTorque {
                    const JointArray& speed) const noexcept;
 
  private:
-  Program gravity_;
+  DesignModel model_;
   SafeAction action_;
   JointArray torque_limit_;
   JointArray max_change_{};

@@ -28,15 +28,39 @@ void to_array(const JointVector<N>& values, JointArray& array) noexcept {
   std::copy(values.data(), values.data() + N, array.data());
 }
 
-/// M_n(z(y)) and G(y) at one sample.
+/// M_n(z(y)) and G(y) at one sample; of a chain of bodies only the angles, and what is asked for is computed.
 template <int N>
 struct ModelSample {
   JointMatrix<N> inertia;
   JointVector<N> gravity;
+  const TreeDynamics* tree = nullptr;
+  JointVector<N> angle;
+
+  /// M_n a + G, of a chain in one sweep.
+  JointVector<N> torque(const JointVector<N>& a) const noexcept {
+    if (tree == nullptr) {
+      return inertia * a + gravity;
+    }
+    JointVector<N> result;
+    tree->torque_at_rest(angle.data(), a.data(), result.data());
+    return result;
+  }
 
   /// M_n^-1 torque; NaN if M_n is not positive definite at this measurement.
   JointVector<N> acceleration(const JointVector<N>& torque) const noexcept {
-    return solve_positive_definite<N>(inertia, torque);
+    if (tree == nullptr) {
+      return solve_positive_definite<N>(inertia, torque);
+    }
+    const JointMatrix<N> mass = tree->inertia(angle.data());
+    return solve_positive_definite<N>(mass, torque);
+  }
+
+  /// G at this sample.
+  JointVector<N> gravity_torque() const noexcept {
+    if (tree == nullptr) {
+      return gravity;
+    }
+    return torque(JointVector<N>::Zero());
   }
 };
 
@@ -44,6 +68,11 @@ struct ModelSample {
 template <int N>
 ModelSample<N> sample_model(const DesignModel& model, const JointVector<N>& y, StepReport& report) noexcept {
   ModelSample<N> sample;
+  if (model.tree) {
+    sample.tree = model.tree.get();
+    sample.angle = y;
+    return sample;
+  }
   const ProgramInput input{y.data()};
   model.premises.evaluate(input, report.premise.data());
   if (model.inertia.evaluate(report.premise.data(), sample.inertia)) {

@@ -14,15 +14,33 @@
 
 namespace quasilpv {
 
+/// What the design inertia of a law may be: a table over premises, or a chain of bodies too, `kind` tree, which needs
+/// no programs.
+enum class Inertia { kTable, kTableOrChain };
+
 /// The table of a law. `inertia` and the programs `premises` and `gravity`, which every law has, are in it from the
 /// beginning; members are read in the order of the table, programs after them. INIT-ONLY.
 template <class Parameters>
 class LawTable : public MemberTable<Parameters> {
  public:
-  explicit LawTable(std::string kind) : kind_(std::move(kind)) {
-    this->add({"inertia", "polytope"}, [](const Field& field, int joints, Parameters& parameters) {
-      parameters.model.inertia = read_inertia(field, joints);
+  explicit LawTable(std::string kind, Inertia inertia = Inertia::kTable) : kind_(std::move(kind)) {
+    const char* const type = inertia == Inertia::kTable ? "polytope" : "design-inertia";
+    this->add({"inertia", type}, [inertia](const Field& field, int joints, Parameters& parameters) {
+      if (inertia == Inertia::kTableOrChain && field.has("kind")) {
+        parameters.model.tree = read_design_tree(field, joints);
+      } else {
+        parameters.model.inertia = read_inertia(field, joints);
+      }
     });
+    if (inertia == Inertia::kTableOrChain) {
+      const std::vector<Member> members{{"mass_kg", "non-negative"}, {"first_moment_kg_m", "numbers"}};
+      this->add({"gravity_load", "object", true, members},
+                [](const Field& field, int /*joints*/, Parameters& parameters) {
+                  if (!parameters.model.tree) {
+                    field.fail("a load", "none beside an inertia by vertices, whose gravity is a program");
+                  }
+                });
+    }
     add_program("premises", [](const Field& field, int joints, Parameters& parameters) {
       parameters.model.premises = Program::parse(field, {joints}, parameters.model.inertia.premises());
     });
@@ -104,10 +122,18 @@ class LawTable : public MemberTable<Parameters> {
 
   std::shared_ptr<const LawParameters> read_law(const Field& law, const Field& programs, int joints) const {
     auto parameters = std::make_shared<Parameters>();
-    programs.only(program_names_);
     this->read(law, joints, *parameters, {"kind"});
-    for (std::size_t i = 0; i < program_reads_.size(); ++i) {
-      program_reads_[i](programs[program_names_[i]], joints, *parameters);
+    if (parameters->model.tree) {
+      programs.only({});
+      if (law.has("gravity_load")) {
+        const Field load = law["gravity_load"];
+        parameters->model.tree = read_design_tree(law["inertia"], joints, &load);
+      }
+    } else {
+      programs.only(program_names_);
+      for (std::size_t i = 0; i < program_reads_.size(); ++i) {
+        program_reads_[i](programs[program_names_[i]], joints, *parameters);
+      }
     }
     if (finish_) {
       finish_(law, *parameters);

@@ -96,8 +96,8 @@ class VelocityLaw : public ControlLaw {
                                 const ModelSample<N>& model) noexcept {
     const JointVector<N> on_path = y - from_array<N>(offset.angle);
     JointVector<N> gravity;
-    model_.gravity.evaluate(ProgramInput{on_path.data()}, gravity.data());
-    return model.gravity - gravity;
+    model_.gravity_at(on_path.data(), gravity.data());
+    return model.gravity_torque() - gravity;
   }
 
   DesignModel model_;

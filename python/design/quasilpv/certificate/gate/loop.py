@@ -90,7 +90,7 @@ class AccelerationLoopData:
 
 @dataclass(frozen=True)
 class Controller:
-    """``a = N_c/D_c y`` as polynomials in zeta: D_c monic of degree 6, N_c of degree at most 6."""
+    """``a = N_c/D_c y`` as polynomials in zeta: D_c monic of degree 6 (5 without integral action), N_c of no more."""
 
     numerator: fmpq_poly
     denominator: fmpq_poly
@@ -119,8 +119,10 @@ class Controller:
         command_a = pole * (x**4 - kp * H1 - kd * H2)
         denominator = angle_nu * command_a - H1 * command_nu
         numerator = angle_nu * pole * ki * x**3 - command_nu * x**4
-        # Multiplying the estimate by zeta^4 has put zeta^3 too much into both.
-        return cls(numerator // x**3, denominator // x**3)
+        # Multiplying the estimate by zeta^4 has put zeta^3 too much into both, and an integral that nothing reads one
+        # zeta more.
+        excess = x**3 if ki != 0 else x**4
+        return cls(numerator // excess, denominator // excess)
 
 
 @dataclass(frozen=True)

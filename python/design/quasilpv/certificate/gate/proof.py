@@ -9,9 +9,10 @@ three are proved in exact or ball arithmetic (``docs/concepts/robust-gate.md`` s
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +28,10 @@ from quasilpv.certificate.gate.motion import MotionDocument, is_proved_in_motion
 from quasilpv.certificate.reading import Shipped, WitnessDocument
 from quasilpv.certificate.robot.data import inertia_data
 from quasilpv.certificate.robot.range import InertiaPair, NeededRange, Place, needed_range
+from quasilpv.certificate.robot.tree import TreeData
+from quasilpv.certificate.robot.tree_range import TreePair, TreeWitness, tree_range
+from quasilpv.documents.mechanism import Tree
+from quasilpv.errors import InputError
 
 GROWTH_RATIOS = 61
 CURVE_POINTS = 41
@@ -56,6 +61,9 @@ class RobustGate:
         worst: numerical worst case over the needed range; None without one.
         motion: whether one Lyapunov function is proved common to all motions (`gate_motion`), and the one that is
             shipped is one (`gate_lyapunov`); None if the artifact does not claim it.
+        sampled_range: smallest and largest ratio that were found: what no proof can beat. Nothing rests on it.
+        seconds_to_find: how long the design took for the storages of the needed range; None if it has none.
+        seconds_to_check: how long the proof of the needed range took.
     """
 
     loop: AccelerationLoopData
@@ -65,6 +73,9 @@ class RobustGate:
     delays: DelayMargin | None
     worst: WorstCase | None
     motion: bool | None = None
+    sampled_range: tuple[float, float] | None = None
+    seconds_to_find: float | None = None
+    seconds_to_check: float | None = None
 
     def __repr__(self) -> str:
         """The verdict in a line."""
@@ -127,8 +138,17 @@ class RobustGate:
             "delay_margin_s": self.delay_margin_s,
             "proved_in_motion": self.motion,
             "needed_range": None if self.needed is None else list(self.needed.to_floats()),
+            "sampled_range": None if self.sampled_range is None else list(self.sampled_range),
             "worst_growth_rate_per_s": None if worst is None else worst.growth_rate_per_s,
             "where": where,
+        }
+
+    def timed_document(self) -> dict[str, Any]:
+        """The same with how long it took, which no artifact holds."""
+        return {
+            **self.to_document(),
+            "seconds_to_find": self.seconds_to_find,
+            "seconds_to_check": self.seconds_to_check,
         }
 
 
@@ -152,14 +172,50 @@ def robust_gate(
     Raises:
         InputError: a robot the gate does not know, or data that contradict each other.
     """
+    margin = inertia_margin(loop, delay_samples)
+    if isinstance(shipped.mechanism, Tree):
+        return _tree_gate(shipped, loop, margin, delay_samples)
+    began = time.perf_counter()
     inertia = InertiaPair(inertia_data(shipped))
-    margin, needed = inertia_margin(loop, delay_samples), needed_range(inertia)
+    needed = needed_range(inertia)
+    seconds = time.perf_counter() - began
     if needed is None:
-        return RobustGate(loop, delay_samples, margin, None, None, None)
+        return RobustGate(loop, delay_samples, margin, None, None, None, seconds_to_check=seconds)
     delays = delay_margin(loop, needed.lowest, needed.highest)
     worst = worst_case(loop, inertia, needed, (fmpq(0), delay_samples))
     motion = _proved_in_motion(shipped, loop, inertia, bound)
-    return RobustGate(loop, delay_samples, margin, needed, delays, worst, motion)
+    sampled = needed.where_lowest.inertia_ratio, needed.where_highest.inertia_ratio
+    return RobustGate(
+        loop, delay_samples, margin, needed, delays, worst, motion, sampled_range=sampled, seconds_to_check=seconds
+    )
+
+
+def _tree_gate(
+    shipped: Shipped[Any], loop: AccelerationLoopData, margin: InertiaMargin | None, delay_samples: fmpq
+) -> RobustGate:
+    """The gate of a robot in space, whose needed range is proved with the storages of its witness."""
+    witness = shipped.witness(TreeWitness).chain
+    pair = TreePair(TreeData.of(shipped))
+    try:
+        found = tree_range(pair, witness)
+    except ValueError as error:
+        raise InputError(shipped.source, "witness.chain", error, "a storage for every joint but the last") from error
+    gate = RobustGate(
+        loop,
+        delay_samples,
+        margin,
+        None,
+        None,
+        None,
+        sampled_range=found.sampled,
+        seconds_to_find=witness.seconds_to_find,
+        seconds_to_check=found.seconds_to_check,
+    )
+    if found.needed is None:
+        return gate
+    delays = delay_margin(loop, found.needed.lowest, found.needed.highest)
+    worst = worst_case(loop, pair, found.needed, (fmpq(0), delay_samples))
+    return replace(gate, needed=found.needed, delays=delays, worst=worst)
 
 
 def _proved_in_motion(
@@ -208,9 +264,14 @@ def margin_curve(loop: AccelerationLoopData, longest_samples: fmpq, points: int 
     return MarginCurve(delay_s, limits[:, 0], limits[:, 1])
 
 
-def worst_case(
-    loop: AccelerationLoopData, inertia: InertiaPair, needed: NeededRange, delays: Sequence[fmpq]
-) -> WorstCase:
+class Places(Protocol):
+    """Where inertia ratios occur."""
+
+    def nearest_place(self, ratio: float) -> Place:
+        """A place one of whose ratios is near a given one."""
+
+
+def worst_case(loop: AccelerationLoopData, inertia: Places, needed: NeededRange, delays: Sequence[fmpq]) -> WorstCase:
     """Largest ``log(spectral radius) / T`` over a grid of the needed range and some delays, in double arithmetic.
 
     Args:

@@ -7,16 +7,17 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from quasilpv.certificate.laws.kind import LawKind
-from quasilpv.documents.law import VelocityLaw
+from quasilpv.documents.law import ChainLaw
 from quasilpv.documents.strict_model import FieldError, NonNegative
 from quasilpv.documents.tables import Vector, require_size
 
 
-class ComputedTorqueLaw(VelocityLaw):
+class ComputedTorqueLaw(ChainLaw):
     """What both have."""
 
     PROGRAMS = ("premises", "gravity", "coriolis")
 
+    velocity_filter_time_constant_s: NonNegative
     gp: Vector
     gd: Vector
     gi: Vector
@@ -24,6 +25,7 @@ class ComputedTorqueLaw(VelocityLaw):
 
     def check(self, joints: int) -> None:
         """See `LawDocument.check`."""
+        super().check(joints)
         for name, gains in (("gp", self.gp), ("gd", self.gd), ("gi", self.gi)):
             require_size(f"law.{name}", gains, joints)
 

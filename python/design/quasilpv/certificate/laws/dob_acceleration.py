@@ -6,18 +6,18 @@ the time unit ``1/w`` of each chain (w: the bandwidth in the witness), with ``t 
 * feedback ``K = (kp / w^2, kd / w, ki / w^3)``, chain ``A = [[1, t, 0], [0, 1, 0], [t, 0, 1]]``,
   ``B = [t^2/2, t, 0]'``; claims: with F = A + B K, ``[[r P, (F - c I) P], [*, r P]] > 0`` (poles in the disk
   ``|z - c| < r``) and ``[[P, F P, B], [*, P, 0], [*, *, 1]] > 0`` (P bounds the stationary covariance under unit white
-  acceleration).
+  acceleration). With ki = 0 nothing reads the integral: its row, column and gain are left out.
 * observer ``l = (l1, l2 / w, l3 / w^2, l4 / w^3)'``, chain ``A = exp(N t)``, N the nilpotent shift; claims: with
   ``F = A (I - l C)``, ``[[r Q, Q (F - c I)], [*, r Q]] > 0``, ``[[Q, Q F], [*, Q - c3' c3]] > 0``, and
   ``objective > trace(H' Q H)`` with ``H = [A l, G]``: the variance of the disturbance estimate.
-* the table of the design inertia: what the run-time side collapses it to (`exact.vertex_tables`);
+* the table of the design inertia, if it is one: what the run-time side collapses it to (`exact.vertex_tables`);
 * the operating envelope, if the witness has one (`sampled_envelope`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Literal
+from collections.abc import Iterator, Mapping
+from typing import ClassVar, Literal
 
 from flint import fmpq, fmpq_mat
 
@@ -29,11 +29,10 @@ from quasilpv.certificate.gate.proof import RobustGate, robust_gate
 from quasilpv.certificate.laws.kind import LawKind
 from quasilpv.certificate.laws.sampled_envelope import SampledEnvelope, sampled_envelope_claims
 from quasilpv.certificate.reading import Rows, Shipped, WitnessDocument
-from quasilpv.certificate.robot.data import inertia_table
 from quasilpv.certificate.robot.design_model import check_design_model
-from quasilpv.documents.law import OptionalMemberLaw
+from quasilpv.documents.law import ChainLaw
 from quasilpv.documents.strict_model import FieldError, Number, Positive, StrictModel
-from quasilpv.documents.tables import Matrix, require_lyapunov
+from quasilpv.documents.tables import Matrix, PolytopeTable, require_lyapunov
 
 KNOWN_SIGNALS = 5
 """Of one joint: what of the loop is known at run time."""
@@ -54,7 +53,7 @@ class LyapunovBound(StrictModel):
     joints: Matrix
 
 
-class DobAccelerationLaw(OptionalMemberLaw):
+class DobAccelerationLaw(ChainLaw):
     """Tracking at the acceleration level with a disturbance observer, the same scalars for every joint.
 
     With ``disturbance_compensation`` false the observer runs but its filtered disturbance is not fed back.
@@ -63,7 +62,7 @@ class DobAccelerationLaw(OptionalMemberLaw):
 
     DISTURBANCE = "acceleration"
 
-    optional = ("lyapunov_bound", "two matrices")
+    optional: ClassVar[Mapping[str, str]] = {**ChainLaw.optional, "lyapunov_bound": "two matrices"}
 
     kind: Literal["dob-acceleration"]
     feedback: Feedback
@@ -74,6 +73,7 @@ class DobAccelerationLaw(OptionalMemberLaw):
 
     def check(self, joints: int) -> None:
         """See `LawDocument.check`."""
+        super().check(joints)
         if self.lyapunov_bound is None:
             return
         require_lyapunov("law.lyapunov_bound.signals", self.lyapunov_bound.signals, KNOWN_SIGNALS)
@@ -119,7 +119,8 @@ def claims(shipped: Shipped[DobAccelerationLaw]) -> Iterator[Claim]:
     witness = shipped.witness(DobAccelerationWitness)
     yield from _feedback_claims(period, law.feedback, witness.feedback)
     yield from _observer_claims(period, law.observer, witness.observer)
-    yield from VertexTable.of(inertia_table(shipped)).collapse_claim("inertia")
+    if isinstance(law.inertia, PolytopeTable):
+        yield from VertexTable.of(law.inertia).collapse_claim("inertia")
     if witness.envelope is not None:
         yield from sampled_envelope_claims(shipped, loop_data(shipped), witness.envelope)
 
@@ -146,14 +147,17 @@ def gate(shipped: Shipped[DobAccelerationLaw], delay_samples: fmpq) -> RobustGat
 def _feedback_claims(period: fmpq, gains: Feedback, witness: FeedbackWitness) -> tuple[Claim, ...]:
     w = rational(witness.bandwidth_rad_s)
     t = w * period
-    transition = matrix([[1, t, 0], [0, 1, 0], [t, 0, 1]])
-    drive = matrix([[t * t / 2], [t], [0]])
     kp, kd, ki = rational(gains.kp), rational(gains.kd), rational(gains.ki)
-    closed = transition + drive * matrix([[kp / w**2, kd / w, ki / w**3]])
-    P = matrix(witness.P)
+    if ki == 0:
+        transition, drive = matrix([[1, t], [0, 1]]), matrix([[t * t / 2], [t]])
+        closed = transition + drive * matrix([[kp / w**2, kd / w]])
+    else:
+        transition, drive = matrix([[1, t, 0], [0, 1, 0], [t, 0, 1]]), matrix([[t * t / 2], [t], [0]])
+        closed = transition + drive * matrix([[kp / w**2, kd / w, ki / w**3]])
+    size, P = closed.nrows(), matrix(witness.P)
     c, r = rational(witness.disk_centre), rational(witness.disk_radius)
-    disk = symmetric([[r * P, (closed - c * identity(3)) * P], [None, r * P]])
-    covariance = symmetric([[P, closed * P, drive], [None, P, zero(3, 1)], [None, None, identity(1)]])
+    disk = symmetric([[r * P, (closed - c * identity(size)) * P], [None, r * P]])
+    covariance = symmetric([[P, closed * P, drive], [None, P, zero(size, 1)], [None, None, identity(1)]])
     return (
         Claim.positive("feedback: pole disk", disk),
         Claim.positive("feedback: covariance", covariance),

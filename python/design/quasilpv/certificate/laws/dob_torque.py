@@ -33,8 +33,8 @@ all ordered i != j (Tuan et al. 2001, Theorem 2.2).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Literal
+from collections.abc import Iterator, Mapping, Sequence
+from typing import ClassVar, Literal
 
 from flint import fmpq, fmpq_mat
 
@@ -63,7 +63,7 @@ class DobTorqueLaw(OptionalMemberLaw):
 
     DISTURBANCE = "torque"
 
-    optional = ("premultiplication", "a block polytope")
+    optional: ClassVar[Mapping[str, str]] = {"premultiplication": "a block polytope"}
 
     kind: Literal["dob-torque"]
     inertia: PolytopeTable

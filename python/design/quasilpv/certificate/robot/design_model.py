@@ -30,6 +30,8 @@ from quasilpv.certificate.robot.data import PREMISES, inertia_data, inertia_tabl
 from quasilpv.certificate.robot.inertia import InertiaData, Pair, design_inertia, true_inertia
 from quasilpv.certificate.robot.range import cosine_range
 from quasilpv.certificate.robot.stabilised_model import premise_box_claims
+from quasilpv.certificate.robot.tree_model import check_tree_model
+from quasilpv.documents.mechanism import Tree
 
 ROUNDING = fmpq(1, 1 << 40)
 """Largest deviation of an entry, relative to the geometric mean of its diagonal entries: about 9e-13."""
@@ -42,6 +44,8 @@ def check_design_model(shipped: Shipped[Any]) -> tuple[Claim, ...]:
         InputError: the robot is not known, or a premise is not the cosine of a difference of absolute angles.
         ValueError: program and table have different premises.
     """
+    if isinstance(shipped.mechanism, Tree):
+        return check_tree_model(shipped)
     data = inertia_data(shipped)
     if data.premise_pairs:
         coverage = [*_coverage_claims(data)]

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -34,7 +35,7 @@ class ChainGains:
     """Gains of one chain and the evidence for them.
 
     Attributes:
-        gains: feedback ``(kp, kd, ki)`` or observer ``(l1, l2, l3, l4)``, SI units.
+        gains: feedback ``(kp, kd, ki)``, ki = 0 without integral action, or observer ``(l1, l2, l3, l4)``, SI units.
         solution: point of the inequalities the gains were read from, in the time unit 1/w.
         lyapunov: value of the Lyapunov variable (P of the feedback, Q of the observer).
         objective: value of the H2 objective in that time unit.
@@ -47,6 +48,15 @@ class ChainGains:
     objective: float
     disk: tuple[float, float]
 
+    def point(self, name: str) -> dict[str, Any]:
+        """The witness of the inequalities, JSON-able, the Lyapunov variable under its name."""
+        return {
+            name: self.lyapunov.tolist(),
+            "disk_centre": self.disk[0],
+            "disk_radius": self.disk[1],
+            "objective": self.objective,
+        }
+
 
 def disk_of(bandwidth: float, sample_period_s: float, width: Fraction) -> tuple[Fraction, Fraction]:
     """Pole disk of a bandwidth: centre ``c = exp(-w T)`` and radius ``width * (1 - c)``, exact rationals.
@@ -58,12 +68,14 @@ def disk_of(bandwidth: float, sample_period_s: float, width: Fraction) -> tuple[
     return centre, width * (1 - centre)
 
 
-def feedback_chain(t: float) -> tuple[Matrix, Matrix]:
+def feedback_chain(t: float, *, integral: bool = True) -> tuple[Matrix, Matrix]:
     """Exact sampled chain of (angle, speed, integral of the angle), held acceleration: A (3x3), B (3x1), rational.
 
-    The integral is the forward sum the runtime computes.
+    The integral is the forward sum the runtime computes; without it the chain has two states.
     """
     period = Fraction(t)
+    if not integral:
+        return to_rational([[1, period], [0, 1]]), to_rational([[period**2 / 2], [period]])
     transition = to_rational([[1, period, 0], [0, 1, 0], [period, 0, 1]])
     return transition, to_rational([[period**2 / 2], [period], [0]])
 
@@ -78,10 +90,13 @@ def observer_chain(t: float) -> tuple[Matrix, Matrix, Matrix]:
     return transition, to_rational([[h**4 / 24], [h**3 / 6], [h**2 / 2], [h]]), to_rational([[1, 0, 0, 0]])
 
 
-def feedback_problem(bandwidth: float, sample_period_s: float) -> tuple[Problem, Variable, Variable]:
+def feedback_problem(
+    bandwidth: float, sample_period_s: float, *, integral: bool = True
+) -> tuple[Problem, Variable, Variable]:
     """State feedback ``a = kp e + kd e' + ki int e`` that least amplifies a white disturbance acceleration.
 
-    Unknowns ``P = P' > 0`` (3x3), ``Y`` (1x3); ``K = Y P^-1``; minimise ``C P C'`` subject to
+    Unknowns ``P = P' > 0`` (3x3), ``Y`` (1x3), of order 2 without integral action; ``K = Y P^-1``; minimise ``C P C'``
+    subject to
 
     * pole disk of ``A + B K`` (`disk_of`, width `FEEDBACK_DISK`),
     * ``[[P, A P + B Y, B], [*, P, 0], [*, *, 1]] > 0`` (P bounds the covariance of the state).
@@ -89,31 +104,37 @@ def feedback_problem(bandwidth: float, sample_period_s: float) -> tuple[Problem,
     Args:
         bandwidth: w, rad/s.
         sample_period_s: T.
+        integral: False for ki = 0, two states.
 
     Returns:
         The problem, P and Y.
     """
-    transition, drive = feedback_chain(bandwidth * sample_period_s)
+    transition, drive = feedback_chain(bandwidth * sample_period_s, integral=integral)
+    size = len(transition)
     centre, radius = disk_of(bandwidth, sample_period_s, FEEDBACK_DISK)
-    P = Variable("P", 3, symmetric=True)
-    Y = Variable("Y", 1, 3)
+    P = Variable("P", size, symmetric=True)
+    Y = Variable("Y", 1, size)
     closed = transition @ P + drive @ Y
     problem = Problem()
     problem.positive("pole disk", pole_disk(P, closed, centre, radius))
-    problem.positive("covariance", block([[P, closed, drive], [None, P, zeros(3, 1)], [None, None, np.array([[1]])]]))
-    angle = to_rational([[1, 0, 0]])
+    problem.positive(
+        "covariance", block([[P, closed, drive], [None, P, zeros(size, 1)], [None, None, np.array([[1]])]])
+    )
+    angle = to_rational([[1, *[0] * (size - 1)]])
     problem.minimise(angle @ P @ angle.T)
     return problem, P, Y
 
 
-def feedback_gains(bandwidth: float, sample_period_s: float) -> ChainGains:
-    """Gains (kp, kd, ki) from an interior point of `feedback_problem`; all negative: they act on ``x - x_r``."""
-    problem, P, Y = feedback_problem(bandwidth, sample_period_s)
+def feedback_gains(bandwidth: float, sample_period_s: float, *, integral: bool = True) -> ChainGains:
+    """Gains (kp, kd, ki) from an interior point of `feedback_problem`; none positive: they act on ``x - x_r``."""
+    problem, P, Y = feedback_problem(bandwidth, sample_period_s, integral=integral)
     centre, radius = disk_of(bandwidth, sample_period_s, FEEDBACK_DISK)
     solution = problem.solve_inside()
     if not solution.values:
         return _no_gains(3, solution, centre, radius)
-    gains = np.linalg.solve(solution.values[P], solution.values[Y].T)[:, 0]
+    gains = np.zeros(3)
+    found = np.linalg.solve(solution.values[P], solution.values[Y].T)[:, 0]
+    gains[: len(found)] = found
     gains = gains * bandwidth ** np.array([2.0, 1.0, 3.0])
     return ChainGains(gains, solution, solution.values[P], solution.objective, (float(centre), float(radius)))
 

@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import Any
 
 from quasilpv.certificate.laws.dob_acceleration import DobAccelerationLaw
-from quasilpv.conditions.tracking.sampled_chains import ChainGains
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.design import AccelerationDesign, design_acceleration_law
 from quasilpv.synthesis.acceleration.envelope import acceleration_envelope
@@ -97,16 +96,7 @@ def _witness(
         longest = {"longest_delay_samples": specification.delay_samples}
         motion = {"motion": {**design.disc.to_document(), **longest, **function}}
     return {
-        "feedback": {"condition": "sampled-feedback", "bandwidth_rad_s": wc, **_point(design.feedback, "P")},
-        "observer": {"condition": "sampled-observer", "bandwidth_rad_s": wo, **_point(design.observer, "Q")},
+        "feedback": {"condition": "sampled-feedback", "bandwidth_rad_s": wc, **design.feedback.point("P")},
+        "observer": {"condition": "sampled-observer", "bandwidth_rad_s": wo, **design.observer.point("Q")},
         **motion,
-    }
-
-
-def _point(chain: ChainGains, name: str) -> dict[str, Any]:
-    return {
-        name: chain.lyapunov.tolist(),
-        "disk_centre": chain.disk[0],
-        "disk_radius": chain.disk[1],
-        "objective": chain.objective,
     }

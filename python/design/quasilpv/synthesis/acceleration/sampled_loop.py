@@ -53,7 +53,8 @@ class AccelerationLaw:
 class LinearController:
     """State-space form ``x+ = A x + B theta``, ``a = C x + D theta`` of the law with zero reference, time in samples.
 
-    States: predicted (angle, speed, disturbance, its rate), filtered disturbance, integral of the angle.
+    States: predicted (angle, speed, disturbance, its rate), filtered disturbance; with integral action the integral of
+    the angle, which otherwise nothing reads.
     """
 
     A: FloatArray
@@ -84,14 +85,20 @@ class LinearController:
                 integral + angle,
             ]
         )
-        return cls(following[:, :6], following[:, 6], command[:6], float(command[6]))
+        kept = 6 if ki != 0.0 else 5
+        return cls(following[:kept, :kept], following[:kept, 6], command[:kept], float(command[6]))
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return len(self.A)
 
 
 @dataclass(frozen=True, eq=False)
 class SampledLoop:
     """One scalar loop: the law against ``theta'' = mu a`` with the command delayed by ``delay_s``.
 
-    The state is (theta, theta', six controller states, the ``floor(delay/T) + 1`` commands still on their way).
+    The state is (theta, theta', the controller's states, the ``floor(delay/T) + 1`` commands still on their way).
     """
 
     law: AccelerationLaw
@@ -112,18 +119,19 @@ class SampledLoop:
         """Per-sample map at ``mu = ratio``, square, time in samples."""
         whole, late = self._delay
         c = self._controller
-        size = 8 + whole + 1
+        first = 2 + c.order  # of the commands
+        size = first + whole + 1
         command = np.zeros(size)
-        command[0], command[2:8] = c.D, c.C
-        commands = [command, *np.eye(size)[8:]]  # newest first; commands[i] was issued i samples ago
+        command[0], command[2:first] = c.D, c.C
+        commands = [command, *np.eye(size)[first:]]  # newest first; commands[i] was issued i samples ago
         new, old = commands[whole], commands[whole + 1]
         following = np.zeros((size, size))
         following[0, 0], following[0, 1], following[1, 1] = 1.0, 1.0, 1.0
         following[0] += ratio * ((1.0 - late) ** 2 / 2 * new + (late - late**2 / 2) * old)
         following[1] += ratio * ((1.0 - late) * new + late * old)
-        following[2:8, 0], following[2:8, 2:8] = c.B, c.A
+        following[2:first, 0], following[2:first, 2:first] = c.B, c.A
         for i in range(whole + 1):
-            following[8 + i] = commands[i]
+            following[first + i] = commands[i]
         return following
 
     def growth_rate(self, ratio: float) -> float:
@@ -147,8 +155,8 @@ class SampledLoop:
         speed = (1.0 - late) + late / z
         plant = (position * shift + speed) / shift**2 / z**whole
         c = self._controller
-        system = z[:, None, None] * np.eye(6) - c.A
-        response = np.linalg.solve(system, np.broadcast_to(c.B, (z.size, 6))[..., None])[..., 0]
+        system = z[:, None, None] * np.eye(c.order) - c.A
+        response = np.linalg.solve(system, np.broadcast_to(c.B, (z.size, c.order))[..., None])[..., 0]
         return np.asarray(plant * (response @ c.C + c.D))
 
     def inertia_margin(self) -> tuple[float, float] | None:
@@ -189,11 +197,12 @@ class SampledLoop:
             return math.inf
         A = self.transition(ratio)
         noise = A[:, 0] - np.eye(A.shape[0])[0]  # the noise enters the controller, not the plant
-        increment = A[8].copy()
-        increment[8] -= 1.0
+        newest = 2 + self._controller.order
+        increment = A[newest].copy()
+        increment[newest] -= 1.0
         covariance, power = np.outer(noise, noise), A
         for _ in range(DOUBLINGS):
             covariance = covariance + power @ covariance @ power.T
             power = power @ power
-        variance = increment @ covariance @ increment + A[8, 0] ** 2
+        variance = increment @ covariance @ increment + A[newest, 0] ** 2
         return float(np.sqrt(variance) / self.law.sample_period_s**2)

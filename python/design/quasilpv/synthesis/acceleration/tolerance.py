@@ -12,7 +12,6 @@ from typing import Protocol
 
 import numpy as np
 
-from quasilpv.synthesis.acceleration.inertia_range import InertiaRange
 from quasilpv.synthesis.acceleration.moving_inertia import InertiaDisc
 from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw, SampledLoop
 from quasilpv.synthesis.specification import Specification
@@ -39,6 +38,18 @@ class Tolerated:
     scales: tuple[float, float] | None
 
 
+class Range(Protocol):
+    """An interval of inertia ratios."""
+
+    @property
+    def lowest(self) -> float:
+        """Smallest ratio."""
+
+    @property
+    def highest(self) -> float:
+        """Largest ratio."""
+
+
 class Tolerance(Protocol):
     """A demand on candidates."""
 
@@ -60,7 +71,7 @@ class FrozenTolerance:
     """
 
     specification: Specification
-    needed: InertiaRange
+    needed: Range
 
     @property
     def span(self) -> float:

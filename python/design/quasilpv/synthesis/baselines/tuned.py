@@ -112,6 +112,7 @@ def _designed(
 ) -> TrackingDesign:
     """The best candidate that also holds on the full grid, as a design with its report."""
     robot, specification = search.robot, search.specification
+    assert isinstance(robot, Robot)
     plants = PlantGrid.full(robot)
     for candidate in search.run():
         loops = search.loops(candidate.tuning, plants)

@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import scipy.optimize
@@ -23,7 +24,7 @@ from quasilpv.synthesis.acceleration import design as acceleration_design
 from quasilpv.synthesis.baselines.printed import Tuning
 from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
-from quasilpv.systems.robots.registry import Robot
+from quasilpv.systems.robots.registry import AnyRobot
 
 Axes = Mapping[str, tuple[float, ...]]
 """Values by name, in units of the sample rate (bandwidths), of the sample period (filter), of the nominal inertia."""
@@ -66,14 +67,16 @@ class TuningSearch:
         law: the baseline frozen at the configurations of nominal inertias, for a sample period.
         axes: its coarse grid; the last axis tells the branches apart.
         plants: the screening grid.
+        largest: bounds of the descent, in the units of the axes.
     """
 
-    robot: Robot
+    robot: AnyRobot
     specification: Specification
-    law: Callable[[Robot, Tuning, FloatArray, float], VelocityLaw]
+    law: Callable[[Any, Tuning, FloatArray, float], VelocityLaw]
     axes: Axes
     plants: PlantGrid
     progress: Progress
+    largest: Mapping[str, float] = field(default_factory=LARGEST.copy)
     tried: int = 0
     admissible: list[Candidate] = field(default_factory=list)
 
@@ -155,7 +158,7 @@ class TuningSearch:
                 known[key] = self._measure(np.exp(x))
             return known[key]
 
-        upper = [math.log(LARGEST[name]) if name in LARGEST else math.inf for name in self.axes]
+        upper = [math.log(self.largest[name]) if name in self.largest else math.inf for name in self.axes]
         scipy.optimize.minimize(
             lambda x: measured(x)[0],
             np.log([start.point[name] for name in self.axes]),
@@ -169,7 +172,7 @@ class TuningSearch:
         """Logarithm of the disturbance gain, and the constraints, satisfied where they are positive."""
         self._count()
         named = zip(self.axes, values.tolist(), strict=True)
-        point = {name: min(value, LARGEST.get(name, math.inf)) for name, value in named}
+        point = {name: min(value, self.largest.get(name, math.inf)) for name, value in named}
         tuning = self.tuning(point)
         loops = self.loops(tuning, self.plants)
         gain = self.disturbance_gain(loops, self.plants)

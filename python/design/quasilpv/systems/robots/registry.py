@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import pi
+from typing import TypeAlias
 
 from quasilpv.errors import look_up
 from quasilpv.systems.robots.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
@@ -13,6 +14,8 @@ from quasilpv.systems.robots.fivebar_linkage import FiveBarLinkage
 from quasilpv.systems.robots.mechanism import PlanarMechanism
 from quasilpv.systems.robots.printed_arms import PrintedSerialArm
 from quasilpv.systems.robots.rolling_disc import InertiaSet, RollingDisc
+from quasilpv.systems.robots.spatial_robot import SpatialRobot
+from quasilpv.systems.robots.ur5 import ur5
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,7 @@ class Robot:
         limits: what its actuators can deliver.
         payloads: the plants a robust design must cover.
         disturbance_frequency_rad_s: the fastest disturbance its controllers are tuned to reject.
+        delay_s: interval of the transport delay, as far as it is known.
     """
 
     id: str
@@ -36,6 +40,12 @@ class Robot:
     limits: ActuatorLimits
     payloads: PayloadSet
     disturbance_frequency_rad_s: float = 20.0
+    delay_s: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def in_space(self) -> bool:
+        """False: it moves in a plane, and has premises."""
+        return False
 
     def __repr__(self) -> str:
         """Its name and its line of the listing."""
@@ -46,13 +56,32 @@ class Robot:
         return self.model.perturbed(*self.payloads.scales_at(fraction))
 
 
+AnyRobot: TypeAlias = Robot | SpatialRobot
+"""A planar robot or one in space: both have id, summary, model, domain, limits, payloads and payload fractions."""
+
+
+def all_robots() -> tuple[AnyRobot, ...]:
+    """All robots, planar ones first, in a fixed order."""
+    return (*robots(), ur5())
+
+
+def any_robot(name: str) -> AnyRobot:
+    """The robot of that name, in the plane or in space.
+
+    Raises:
+        InputError: there is none; the message lists those there are.
+    """
+    known = {entry.id: entry for entry in all_robots()}
+    return look_up(known, name, "robots", "robot")
+
+
 def robots() -> tuple[Robot, ...]:
-    """All robots, in a fixed order."""
+    """All planar robots, in a fixed order."""
     return (_arm2(), _arm3(), _arm2_upright(), _arm3_light(), _fivebar(), _spring_disc())
 
 
 def robot(name: str) -> Robot:
-    """The robot of that name.
+    """The planar robot of that name.
 
     Raises:
         InputError: there is none; the message lists those there are.

@@ -216,11 +216,11 @@ class KinematicTree:
 
     def tool_pose(self, q: ArrayLike) -> Placement:
         """Placement of the tool's frame in the base, at coordinates (n,)."""
-        return Placement(*self._frames(self.coordinates(q))[-1])
+        return Placement(*self.frames(q)[-1])
 
     def tool_jacobian(self, q: ArrayLike) -> FloatArray:
         """J of the tool, (6, n), its twist in the axes of the base and its own origin."""
-        frames = self._frames(self.coordinates(q))
+        frames = self.frames(q)
         tip, J = frames[-1][1], np.zeros((6, self.order))
         for k, (joint, (R, origin)) in enumerate(zip(self.joints, frames[:-1], strict=True)):
             axis = R @ joint.axis
@@ -234,7 +234,7 @@ class KinematicTree:
         In the axes of the base. A column (a x p; a) of J, p from the joint to the tool, changes by
         ``(w x a) x p + a x p'`` and ``w x a``, with w the angular velocity of the axis.
         """
-        frames, w = self._frames(self.coordinates(q)), self.coordinates(speed)
+        frames, w = self.frames(q), self.coordinates(speed)
         arms = [
             (R @ joint.axis, frames[-1][1] - origin) for joint, (R, origin) in zip(self.joints, frames, strict=False)
         ]
@@ -256,11 +256,11 @@ class KinematicTree:
                 drift[:3] += turned
         return drift
 
-    def _frames(self, q: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-        """Rotation and origin of every joint's frame in the base, then those of the tool."""
+    def frames(self, q: ArrayLike) -> list[tuple[FloatArray, FloatArray]]:
+        """Rotation and origin of every joint's frame in the base, then those of the tool, at coordinates (n,)."""
         frames = []
         R, origin = np.eye(3), np.zeros(3)
-        for joint, coordinate in zip(self.joints, q, strict=True):
+        for joint, coordinate in zip(self.joints, self.coordinates(q), strict=True):
             origin = origin + R @ joint.placement.translation_m
             R = R @ joint.placement.rotation
             if joint.turns:

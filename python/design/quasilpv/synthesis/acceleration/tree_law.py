@@ -1,0 +1,166 @@
+"""The tracking law `dob-acceleration` for robots in space.
+
+The design inertia is ``M_n = s M(empty)``: then ``c2/c1`` is the least there is, for ``c1 M_n < M_t < c2 M_n`` over all
+postures and loads needs at least the largest eigenvalue of ``M(empty)^-1 M(loaded)``. Gravity is that of the robot with
+half its load, which is independent of the inertia and halves what the observer has to find out at the start.
+
+Torque activity is judged joint by joint, since the limits of wrists and shoulders differ several times: the rounding of
+all encoders goes through a row of M_n to a joint's torque. Where Coulomb friction is stated there is no integral
+action: the observer integrates already, and two integrators make an arm that sticks hunt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from quasilpv.conditions.tracking.sampled_chains import ChainGains
+from quasilpv.errors import InfeasibleError, InputError
+from quasilpv.progress import Progress, no_progress
+from quasilpv.synthesis.acceleration.search import BandwidthSearch, Candidate, Grid, growth_rates
+from quasilpv.synthesis.acceleration.tolerance import FrozenTolerance
+from quasilpv.synthesis.chain_range import ChainRange, find_range
+from quasilpv.synthesis.specification import Specification
+from quasilpv.synthesis.tracking_design import TrackingDesign
+from quasilpv.systems.robots.spatial_robot import SpatialRobot
+from quasilpv.systems.robots.tree import KinematicTree
+from quasilpv.systems.robots.tree_mechanism import TreeMechanism
+
+FloatArray = npt.NDArray[np.float64]
+
+GRID = Grid(
+    feedback=tuple(float(w) for w in np.geomspace(0.01, 0.28, 13)),
+    observer=tuple(float(w) for w in np.geomspace(0.2, 2.6, 12)),
+    filter_samples=(0.15, 0.3, 0.6, 1.2),
+)
+GRAVITY_SHARE = 0.5
+"""Of the load, in the middle of its box, that the law's gravity torque carries."""
+
+POSTURES = 4000
+SEED = 20220315
+
+
+@dataclass(frozen=True)
+class _Range:
+    """Of ``M_t / M(empty)``."""
+
+    lowest: float
+    highest: float
+
+
+def tree_acceleration_law(
+    robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
+) -> TrackingDesign:
+    """Design `dob-acceleration` for a robot in space.
+
+    Args:
+        robot: what it is for.
+        specification: what is asked for; its torque activity is a share of each joint's own limit.
+        progress: called with (points done, points in all).
+
+    Raises:
+        InputError: the drives of the robot lag.
+        InfeasibleError: no bounds of the inertia were found, or no design meets the specification.
+    """
+    _require_delay_only(robot)
+    found = find_range(robot, robot.tree)
+    if found is None:
+        raise InfeasibleError(f"{robot.id}: no bounds of the inertia were found: the solver has no answer")
+    needed = _Range(found.lowest.bound, found.highest.bound)
+    search = BandwidthSearch(
+        robot.id,
+        specification,
+        needed,
+        FrozenTolerance(specification, needed),
+        activity_bound=specification.torque_activity,
+        noise=specification.angle_noise_rad * largest_row(robot),
+        unit="of a joint's torque limit, rms",
+        integral=not robot.rubs,
+    )
+    best = search.run(GRID, progress)
+    feedback, observer = search.gains_of_best()
+    kp, kd, ki = (float(gain) for gain in best.law.feedback)
+    return TrackingDesign(
+        controller="dob-acceleration",
+        robot=robot,
+        sample_period_s=specification.sample_period_s,
+        law={
+            "kind": "dob-acceleration",
+            "feedback": {"kp": kp, "kd": kd, "ki": ki},
+            "observer": [float(gain) for gain in best.law.observer],
+            "filter_time_constant_s": best.law.filter_time_constant_s,
+            "disturbance_compensation": True,
+            **design_inertia(robot, best.inertia_scale),
+        },
+        expressions={},
+        inputs={"controller": "dob-acceleration", "specification": specification.to_document()},
+        report=_report(best, specification, found, search.tried),
+        witness=_witness(best, feedback, observer, found),
+    )
+
+
+def design_inertia(robot: SpatialRobot, scale: float) -> dict[str, Any]:
+    """The members ``inertia`` and ``gravity_load`` of a law: ``M_n a + G_n`` in one sweep over one chain.
+
+    The bodies of the chain are s times the empty robot's, its gravity is 1/s of the true one, so that the gravity
+    torque of the bodies is the empty robot's own; and the last body carries ``gravity_load`` more, for gravity only.
+    """
+    scaled = robot.tree.scaled(scale, scale)
+    tree = KinematicTree(scaled.name, scaled.joints, scaled.tool, robot.tree.gravity_m_s2 / scale)
+    nothing = (0.0,) * tree.order
+    members: dict[str, Any] = {"inertia": TreeMechanism(tree, nothing, nothing).parameters_document()}
+    if robot.payload is not None:
+        load = robot.payload.central(GRAVITY_SHARE).seen_from(robot.tree.tool)
+        members["gravity_load"] = {
+            "mass_kg": load.mass_kg * scale,
+            "first_moment_kg_m": (load.first_moment_kg_m * scale).tolist(),
+        }
+    return members
+
+
+def largest_row(robot: SpatialRobot) -> float:
+    """Largest norm of a row of M(empty) over the limit of its joint, at random postures of the domain, 1/(rad/s^2)."""
+    rng = np.random.default_rng(SEED)
+    low, high = np.array(robot.domain.angle_rad).T
+    inertia = robot.tree.inertia(rng.uniform(low, high, (POSTURES, len(low))))
+    return float((np.linalg.norm(inertia, axis=2) / np.array(robot.limits.torque_nm)).max())
+
+
+def _require_delay_only(robot: SpatialRobot) -> None:
+    if robot.lag_s[1] > 0.0:
+        expected = "0: the robust gate covers every transport delay up to one, but no lag of the drives"
+        raise InputError(robot.source, "lag", list(robot.lag_s), expected)
+
+
+def _report(best: Candidate, specification: Specification, found: ChainRange, tried: int) -> dict[str, Any]:
+    """The numbers a person asks for, JSON-able."""
+    rates = growth_rates(best, specification)
+    worst, where = max(rates.values())
+    return {
+        "feedback_bandwidth_rad_s": best.bandwidths[0],
+        "observer_bandwidth_rad_s": best.bandwidths[1],
+        "filter_time_constant_s": best.law.filter_time_constant_s,
+        "integral_action": bool(best.law.feedback[2] != 0.0),
+        "inertia_scale": best.inertia_scale,
+        "inertia_margin": list(best.inertia_margin),
+        "needed_range": list(best.needed_range),
+        "worst_growth_rate_per_s": worst,
+        "worst_growth_rate_at_inertia_ratio": where,
+        "growth_rates_per_s": {name: rate for name, (rate, _) in rates.items()},
+        "disturbance_gain_s2": best.disturbance_gain,
+        "predicted_torque_activity": best.torque_increment,
+        "candidates_tried": tried,
+    }
+
+
+def _witness(best: Candidate, feedback: ChainGains, observer: ChainGains, found: ChainRange) -> dict[str, Any]:
+    """The points of the two conditions, and bounds and storages of the inertia."""
+    wc, wo = best.bandwidths
+    return {
+        "feedback": {"condition": "sampled-feedback", "bandwidth_rad_s": wc, **feedback.point("P")},
+        "observer": {"condition": "sampled-observer", "bandwidth_rad_s": wo, **observer.point("Q")},
+        "chain": found.for_scaled_design(best.inertia_scale),
+    }

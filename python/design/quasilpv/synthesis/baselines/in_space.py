@@ -1,0 +1,204 @@
+"""Baselines for robots in space, tuned as `dob-acceleration` is: PID with gravity, computed torque.
+
+With torques ``D (kp e + ...)``, D a positive definite matrix, the frozen loops of all joints decouple into scalar ones,
+``theta'' = a / rho`` with rho the eigenvalues of ``D^-1 M_t``, as those of the default law do. So each baseline is
+searched for on scalar loops over the range of rho: of computed torque, ``D = s M(empty)``, the bounds that the default
+law is designed with; of PID, D diagonal with the largest inertia of each joint, a range from random postures.
+
+Objective, constraints and effort are those of `quasilpv.synthesis.baselines.tuned`; torque activity is a share of each
+joint's limit, from the noise of encoders and of measured speeds. The gravity torque is that of the default law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from quasilpv.errors import InfeasibleError
+from quasilpv.loops.loop_grid import LoopGrid
+from quasilpv.loops.velocity_law import VelocityLaw
+from quasilpv.progress import Progress, no_progress
+from quasilpv.synthesis.acceleration.tree_law import POSTURES, SEED, design_inertia, largest_row
+from quasilpv.synthesis.baselines.printed import Tuning
+from quasilpv.synthesis.baselines.tuned import COMPUTED_TORQUE, WITH_OBSERVER
+from quasilpv.synthesis.baselines.tuning_search import LARGEST, Axes, Candidate, TuningSearch
+from quasilpv.synthesis.chain_range import find_range
+from quasilpv.synthesis.plant_grid import PlantGrid
+from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
+from quasilpv.synthesis.tracking_design import TrackingDesign
+from quasilpv.systems.robots.spatial_robot import SpatialRobot
+
+FloatArray = npt.NDArray[np.float64]
+
+RATIOS = 5
+"""Scalar loops, geometrically spaced over the range."""
+
+FREQUENCIES = (0.05, 0.25, 1.0)
+"""Disturbances that are rejected, parts of the fastest: gravity and friction of a slow motion are among them."""
+
+LARGEST_IN_SPACE = {
+    **LARGEST,
+    "bandwidth": 0.5,
+    "filter_time": 100.0,
+    "observer_bandwidth": 0.5,
+    "inertia_scale": 10.0,
+}
+"""Where the descent ends, in the units of the axes."""
+
+AXES: Mapping[str, Axes] = {
+    "pid-tuned": {
+        "bandwidth": tuple(float(w) for w in np.geomspace(0.005, 0.2, 10)),
+        "integral_ratio": (0.1, 0.3, 1.0),
+        "filter_time": (0.5, 1.5, 4.0, 12.0),
+        "inertia_scale": tuple(float(s) for s in np.geomspace(0.3, 4.0, 5)),
+    },
+    "ctc-tuned": COMPUTED_TORQUE,
+    "ctc-dob-tuned": WITH_OBSERVER,
+}
+"""Coarse grids, as those of `quasilpv.synthesis.baselines.tuned`."""
+
+
+@dataclass(eq=False)
+class TreeTuningSearch(TuningSearch):
+    """A search on scalar loops; torque increments are shares of a joint's limit.
+
+    Attributes:
+        row: what an acceleration of one unit asks of the joint that has the least torque for it, as such a share.
+    """
+
+    row: float = 1.0
+
+    @property
+    def activity_bound_nm(self) -> float:
+        """Largest admissible rms torque increment, as a share."""
+        return self.specification.torque_activity
+
+    def disturbance_gain(self, loops: LoopGrid, plants: PlantGrid) -> float:
+        """Worst over the plants and `FREQUENCIES`, s^2: alone the fastest would not ask for any stiffness."""
+        unit = np.asarray(np.linalg.cholesky(plants.nominal), dtype=np.float64)
+        fastest = self.specification.disturbance_frequency_rad_s
+        return max(loops.disturbance_gain(fastest * part, unit) for part in FREQUENCIES)
+
+    def torque_increment(self, loops: LoopGrid) -> float:
+        """Worst over the plants, as a share."""
+        return self.row * loops.torque_activity([self.specification.angle_noise_rad, VELOCITY_NOISE_RAD_S])
+
+
+def pid_gravity_tuned(
+    robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
+) -> TrackingDesign:
+    """PID with gravity. InfeasibleError: no point of the search meets the specification."""
+    return _pid("pid-tuned", robot, specification, progress)
+
+
+def computed_torque_tuned(
+    robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
+) -> TrackingDesign:
+    """Computed torque. InfeasibleError: no point of the search meets the specification."""
+    return _computed_torque("ctc-tuned", robot, specification, progress)
+
+
+def computed_torque_with_observer_tuned(
+    robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
+) -> TrackingDesign:
+    """Computed torque with observer. InfeasibleError: no point of the search meets the specification."""
+    return _computed_torque("ctc-dob-tuned", robot, specification, progress)
+
+
+def scalar_law(robot: SpatialRobot, tuning: Tuning, nominal: FloatArray, period: float) -> VelocityLaw:
+    """The law of one joint of unit inertia, (B, 1, 1); the period is in s."""
+    del robot
+    inertia = tuning.inertia_scale * nominal
+    kp, kd, ki = (gain * inertia for gain in tuning.unit_gains())
+    filter_time, observer = tuning.velocity_filter_time_constant_s, tuning.observer_bandwidth_rad_s
+    return VelocityLaw(period, kp, kd, ki, inertia, filter_time, observer)
+
+
+def _pid(controller: str, robot: SpatialRobot, specification: Specification, progress: Progress) -> TrackingDesign:
+    driven, lowest, highest = _driven_inertia(robot)
+    row = float((driven / np.array(robot.limits.torque_nm)).max())
+    best = _best(controller, robot, specification, progress, (lowest, highest, row))
+    gains = zip(("kp", "kd", "ki"), best.tuning.unit_gains(), strict=True)
+    per_joint = best.tuning.inertia_scale * driven
+    law = {
+        "kind": "pid",
+        **{name: (gain * per_joint).tolist() for name, gain in gains},
+        "velocity_filter_time_constant_s": best.tuning.velocity_filter_time_constant_s,
+        **design_inertia(robot, 1.0),
+    }
+    return _designed(controller, robot, specification, law, best)
+
+
+def _computed_torque(
+    controller: str, robot: SpatialRobot, specification: Specification, progress: Progress
+) -> TrackingDesign:
+    found = find_range(robot, robot.tree)
+    if found is None:
+        raise InfeasibleError(f"{robot.id}: no bounds of the inertia were found: the solver has no answer")
+    bounds = found.lowest.bound, found.highest.bound, largest_row(robot)
+    best = _best(controller, robot, specification, progress, bounds)
+    gains = zip(("gp", "gd", "gi"), best.tuning.unit_gains(), strict=True)
+    observer = best.tuning.observer_bandwidth_rad_s
+    law = {
+        "kind": "ctc-dob" if observer > 0.0 else "ctc",
+        **{name: [gain] * robot.tree.order for name, gain in gains},
+        "velocity_filter_time_constant_s": best.tuning.velocity_filter_time_constant_s,
+        "disturbance_observer_bandwidth_rad_s": observer,
+        **design_inertia(robot, best.tuning.inertia_scale),
+    }
+    return _designed(controller, robot, specification, law, best)
+
+
+def _best(
+    controller: str,
+    robot: SpatialRobot,
+    specification: Specification,
+    progress: Progress,
+    bounds: tuple[float, float, float],
+) -> Candidate:
+    lowest, highest, row = bounds
+    axes = AXES[controller]
+    ratios = np.geomspace(lowest, highest, RATIOS)[:, None, None]
+    plants = PlantGrid(np.zeros((RATIOS, 1)), np.ones((RATIOS, 1, 1)), {1.0: ratios})
+    search = TreeTuningSearch(robot, specification, scalar_law, axes, plants, progress, LARGEST_IN_SPACE, row=row)
+    found = search.run()
+    if not found:
+        about = f"{robot.id}: no {controller} design at {specification.rate_hz:g} Hz"
+        raise InfeasibleError(
+            f"{about}: no point of the search is stable with every payload within the torque activity"
+        )
+    return found[0]
+
+
+def _driven_inertia(robot: SpatialRobot) -> tuple[FloatArray, float, float]:
+    """Largest diagonal of M(empty), and the range of ``D^-1 M_t`` over random postures and loads."""
+    rng = np.random.default_rng(SEED)
+    low, high = np.array(robot.domain.angle_rad).T
+    postures = rng.uniform(low, high, (POSTURES, len(low)))
+    driven = np.einsum("kii->ki", robot.tree.inertia(postures)).max(axis=0)
+    unit = np.diag(driven**-0.5)
+    below = np.linalg.eigvalsh(unit @ robot.lightest().inertia(postures) @ unit)[:, 0].min()
+    above = max(np.linalg.eigvalsh(unit @ heavy.inertia(postures) @ unit)[:, -1].max() for heavy in robot.heaviest())
+    return driven, float(below), float(above)
+
+
+def _designed(
+    controller: str, robot: SpatialRobot, specification: Specification, law: dict[str, Any], best: Candidate
+) -> TrackingDesign:
+    return TrackingDesign(
+        controller=controller,
+        robot=robot,
+        sample_period_s=specification.sample_period_s,
+        law=law,
+        expressions={},
+        inputs={"controller": controller, "specification": specification.to_document()},
+        report={
+            **asdict(best.tuning),
+            "disturbance_gain_s2": best.disturbance_gain,
+            "predicted_torque_activity": best.torque_increment_nm,
+        },
+    )

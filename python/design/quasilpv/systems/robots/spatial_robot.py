@@ -1,0 +1,238 @@
+"""A robot in space with all that a design needs to know of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from quasilpv.errors import InputError
+from quasilpv.systems.robots.arm_parameters import ActuatorLimits, OperatingDomain
+from quasilpv.systems.robots.spatial import Placement, SpatialInertia
+from quasilpv.systems.robots.tree import KinematicTree
+from quasilpv.systems.robots.tree_mechanism import TreeMechanism
+
+Interval = tuple[float, float]
+
+UNSTATED_SLEW_NM_PER_S = 1e6
+"""Slew limit of a drive of which nobody says how fast its torque can change."""
+
+
+@dataclass(frozen=True)
+class SpatialJoint:
+    """One joint as its owner states it.
+
+    Attributes:
+        name: of the joint.
+        angle_rad: interval a design holds in, rad (m for a joint that slides).
+        speed_rad_s, torque_nm, slew_nm_per_s: largest ones.
+        rotor_inertia_kg_m2: reflected to the joint.
+        rotor_tolerance: share by which it may differ, up and down.
+        encoder_bits: per turn; None if nobody said.
+        friction_viscous_nm_s, friction_coulomb_nm: of the true robot, as far as they are known.
+    """
+
+    name: str
+    angle_rad: Interval
+    speed_rad_s: float
+    torque_nm: float
+    slew_nm_per_s: float
+    rotor_inertia_kg_m2: float
+    rotor_tolerance: float
+    encoder_bits: int | None
+    friction_viscous_nm_s: float
+    friction_coulomb_nm: float
+
+
+@dataclass(frozen=True)
+class PayloadBody:
+    """All loads the robot may carry.
+
+    Attributes:
+        mass_kg: largest mass.
+        com_box_m: box of the centre of mass in the tool's frame.
+        inertia_kg_m2: bound of the moment of inertia about the centre of mass, per axis of the tool's frame.
+    """
+
+    mass_kg: float
+    com_box_m: tuple[Interval, Interval, Interval]
+    inertia_kg_m2: tuple[float, float, float]
+
+    def corners(self) -> tuple[SpatialInertia, ...]:
+        """The heaviest loads with the centre of mass at a corner of the box, about the tool's frame.
+
+        Kinetic energy is convex in the place of the centre of mass and grows with mass and moment of inertia: whatever
+        bounds the energy of these loads bounds that of every load.
+        """
+        rotational = np.diag(self.inertia_kg_m2)
+        places = dict.fromkeys(product(*self.com_box_m))
+        return tuple(SpatialInertia.about_com(self.mass_kg, place, rotational) for place in places)
+
+    def farthest(self, share: float) -> SpatialInertia:
+        """The load at the corner of the box that is farthest from the tool, with a share of mass and moment of inertia.
+
+        Of corners equally far the one with the larger coordinates.
+        """
+        place = max(product(*self.com_box_m), key=lambda corner: (round(float(np.dot(corner, corner)), 12), corner))
+        return SpatialInertia.about_com(self.mass_kg * share, place, share * np.diag(self.inertia_kg_m2))
+
+    def central(self, share: float) -> SpatialInertia:
+        """The load in the middle of the box with a share of mass and moment of inertia."""
+        middle = [(low + high) / 2.0 for low, high in self.com_box_m]
+        return SpatialInertia.about_com(self.mass_kg * share, middle, share * np.diag(self.inertia_kg_m2))
+
+
+@dataclass(frozen=True, eq=False)
+class SpatialPlants:
+    """The set of robots around a nominal one, as an artifact states it.
+
+    Attributes:
+        link_tolerance: share by which the inertia of every link may differ.
+        rotor_tolerance: the same of every rotor.
+        load: what the tool may carry; None for nothing.
+        tool: placement of the load's frame in that of the last joint.
+    """
+
+    link_tolerance: float
+    rotor_tolerance: tuple[float, ...]
+    load: PayloadBody | None
+    tool: Placement
+
+    def to_document(self) -> dict[str, Any]:
+        """The ``payloads`` member of an artifact."""
+        load = self.load
+        return {
+            "link_tolerance": self.link_tolerance,
+            "rotor_tolerance": list(self.rotor_tolerance),
+            "load": None
+            if load is None
+            else {
+                "rotation": self.tool.rotation.tolist(),
+                "translation_m": self.tool.translation_m.tolist(),
+                "mass_kg": load.mass_kg,
+                "com_box_m": [list(interval) for interval in load.com_box_m],
+                "inertia_kg_m2": list(load.inertia_kg_m2),
+            },
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class SpatialRobot:
+    """A robot in space.
+
+    Attributes:
+        id: the name it is known by.
+        tree: without payload; limits of its joints are those of the design.
+        joints: what is stated of each joint.
+        payload: the loads it may carry; None for none.
+        link_uncertainty: share by which the inertia of every link may differ.
+        delay_s, lag_s: interval of the transport delay, and of the time constant of the drives, common to all joints.
+        source: file it comes from.
+        summary: one line for a listing.
+        disturbance_frequency_rad_s: the fastest disturbance its controllers are tuned to reject.
+    """
+
+    id: str
+    tree: KinematicTree
+    joints: tuple[SpatialJoint, ...]
+    payload: PayloadBody | None
+    link_uncertainty: float
+    delay_s: Interval
+    lag_s: Interval
+    source: str
+    summary: str = ""
+    disturbance_frequency_rad_s: float = 20.0
+
+    def __repr__(self) -> str:
+        """Its name and its line of the listing."""
+        return f"SpatialRobot({self.id!r}: {self.summary or self.source})"
+
+    # ---- what every robot has, see `quasilpv.systems.robots.registry.AnyRobot` ------------------------------------
+
+    @property
+    def in_space(self) -> bool:
+        """True: its laws compute inertia and gravity by a recursion over its bodies."""
+        return True
+
+    @cached_property
+    def model(self) -> TreeMechanism:
+        """The nominal robot, empty."""
+        return self._with_friction(self.tree)
+
+    @cached_property
+    def domain(self) -> OperatingDomain:
+        """Angles and speeds a design is stated for."""
+        return OperatingDomain(
+            tuple(joint.angle_rad for joint in self.joints),
+            tuple((-joint.speed_rad_s, joint.speed_rad_s) for joint in self.joints),
+        )
+
+    @cached_property
+    def limits(self) -> ActuatorLimits:
+        """What the drives deliver."""
+        slews = (joint.slew_nm_per_s for joint in self.joints)
+        return ActuatorLimits(
+            tuple(joint.torque_nm for joint in self.joints),
+            tuple(slew if isfinite(slew) else UNSTATED_SLEW_NM_PER_S for slew in slews),
+        )
+
+    @cached_property
+    def payloads(self) -> SpatialPlants:
+        """The robots a design must cover."""
+        rotors = tuple(joint.rotor_tolerance for joint in self.joints)
+        return SpatialPlants(self.link_uncertainty, rotors, self.payload, self.tree.tool)
+
+    def with_payload_fraction(self, fraction: float) -> TreeMechanism:
+        """The nominal robot with a share of its load in [0, 1], far out: see `PayloadBody.farthest`.
+
+        Raises:
+            InputError: the fraction is outside [0, 1].
+        """
+        if not 0.0 <= fraction <= 1.0:
+            raise InputError("payloads", "fraction", fraction, "a number in [0, 1]")
+        if self.payload is None or fraction == 0.0:
+            return self.model
+        return self._with_friction(self.tree.carrying(self.payload.farthest(fraction)))
+
+    def _with_friction(self, tree: KinematicTree) -> TreeMechanism:
+        return TreeMechanism(
+            tree,
+            tuple(joint.friction_viscous_nm_s for joint in self.joints),
+            tuple(joint.friction_coulomb_nm for joint in self.joints),
+        )
+
+    @property
+    def rubs(self) -> bool:
+        """Whether Coulomb friction is stated of a joint."""
+        return any(joint.friction_coulomb_nm > 0.0 for joint in self.joints)
+
+    # ---- the set of robots -------------------------------------------------------------------------------------------
+
+    def lightest(self) -> KinematicTree:
+        """The robot with the least inertia: empty, all links and rotors at the lower end."""
+        return self._scaled(-1.0)
+
+    def heaviest(self) -> tuple[KinematicTree, ...]:
+        """The robots whose inertias bound all others from above: full load at every corner, links at the upper end."""
+        full = self._scaled(1.0)
+        return (full,) if self.payload is None else tuple(full.carrying(corner) for corner in self.payload.corners())
+
+    def loaded(self, share: float) -> KinematicTree:
+        """The nominal robot with a share of the load in the middle of its box."""
+        return self.tree if self.payload is None else self.tree.carrying(self.payload.central(share))
+
+    def _scaled(self, sign: float) -> KinematicTree:
+        links = 1.0 + sign * self.link_uncertainty
+        joints = tuple(
+            replace(
+                own,
+                inertia=own.inertia.scaled(links),
+                rotor_inertia_kg_m2=own.rotor_inertia_kg_m2 * (1.0 + sign * stated.rotor_tolerance),
+            )
+            for own, stated in zip(self.tree.joints, self.joints, strict=True)
+        )
+        return replace(self.tree, joints=joints)

@@ -1,0 +1,83 @@
+"""A robot in space as designs, scenarios and figures know a mechanism: its chain, and the friction of its joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from quasilpv.systems.robots.tree import KinematicTree
+
+FloatArray = NDArray[np.float64]
+
+COULOMB_SPEED_RAD_S = 0.01
+"""Speed w0 in the smoothed Coulomb friction ``c tanh(w / w0)`` of simulated joints."""
+
+
+@dataclass(frozen=True, eq=False)
+class TreeMechanism:
+    """A chain of bodies, and what rubs at its joints.
+
+    Attributes:
+        tree: the chain; its tool is what paths are for.
+        friction_viscous_nm_s: torque per speed, (n,).
+        friction_coulomb_nm: torque against the direction of motion, (n,).
+    """
+
+    tree: KinematicTree
+    friction_viscous_nm_s: tuple[float, ...]
+    friction_coulomb_nm: tuple[float, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the chain."""
+        return self.tree.name
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return self.tree.order
+
+    def inertia(self, theta: ArrayLike) -> FloatArray:
+        """M, (n, n), kg m^2."""
+        return self.tree.inertia(theta)
+
+    def gravity(self, theta: ArrayLike) -> FloatArray:
+        """G, (n,), N m."""
+        return self.tree.gravity(theta)
+
+    def inverse_dynamics(self, theta: ArrayLike, omega: ArrayLike, acceleration: ArrayLike) -> FloatArray:
+        """The torque of a motion, friction included, (n,), N m."""
+        w = np.asarray(omega, dtype=float)
+        coulomb = np.array(self.friction_coulomb_nm) * np.tanh(w / COULOMB_SPEED_RAD_S)
+        rubbing = np.array(self.friction_viscous_nm_s) * w + coulomb
+        return np.asarray(self.tree.inverse_dynamics(theta, omega, acceleration) + rubbing)
+
+    def forward_kinematics(self, theta: ArrayLike) -> FloatArray:
+        """Place of the tool in the base, (3,), m."""
+        return self.tree.tool_pose(theta).translation_m
+
+    def skeleton(self, theta: ArrayLike) -> FloatArray:
+        """The arm as one line: base, joints, tool, (n + 2) x 3, m: what a drawing shows."""
+        return np.vstack([np.zeros(3), *(origin for _, origin in self.tree.frames(theta))])
+
+    def parameters_document(self) -> dict[str, Any]:
+        """The chain as JSON-able data, a mechanism of kind ``tree``."""
+        return self.tree.parameters_document()
+
+    def plant_document(self, label: str) -> dict[str, Any]:
+        """The ``plant`` member of a scenario file."""
+        document = self.parameters_document()
+        rubbing = zip(document["joints"], self.friction_viscous_nm_s, self.friction_coulomb_nm, strict=True)
+        joints = [
+            {
+                **joint,
+                "friction_viscous_nm_s": viscous,
+                "friction_coulomb_nm": coulomb,
+                "coulomb_speed_rad_s": COULOMB_SPEED_RAD_S,
+            }
+            for joint, viscous, coulomb in rubbing
+        ]
+        return {**document, "label": label, "joints": joints}
