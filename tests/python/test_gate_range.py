@@ -48,6 +48,7 @@ ANSWER = {
     "delay_margin_s": float,
     "proved_in_motion": type(None),
     "needed_range": list,
+    "sampled_range": list,
     "worst_growth_rate_per_s": float,
     "where": dict,
 }
