@@ -15,7 +15,8 @@ namespace quasilpv {
 /// A design inertia: symmetric vertices, positive definite at the centre. INIT-ONLY, as all here. Throws InputError.
 BlockPolytope read_inertia(const Field& field, int joints);
 
-/// A design inertia as a chain of bodies, one per joint. \param load what it carries for its gravity only; null: nothing.
+/// A design inertia as a chain of bodies, one per joint. \param load what it carries for its gravity only; null:
+/// nothing.
 std::shared_ptr<const TreeDynamics> read_design_tree(const Field& field, int joints, const Field* load = nullptr);
 
 /// P of size x size, symmetric and positive definite. Throws InputError.

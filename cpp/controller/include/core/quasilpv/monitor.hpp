@@ -10,8 +10,8 @@
 
 namespace quasilpv {
 
-/// What the monitor saw at one sample. For telemetry only: nothing in the loop depends on it. A design inertia that is a
-/// chain of bodies has neither vertices nor premises to leave.
+/// What the monitor saw at one sample. For telemetry only: nothing in the loop depends on it. A design inertia that is
+/// a chain of bodies has neither vertices nor premises to leave.
 struct MonitorReport {
   double membership_sum = 1.0;  ///< sum of the weights of the inertia's vertices after clamping; 1 up to rounding
   double premise_excess = 0.0;  ///< BlockPolytope::excess() before clamping: 0 inside the box
