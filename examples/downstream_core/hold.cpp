@@ -1,4 +1,4 @@
-// What a controller answers to a robot at rest: hold ARTIFACT SAMPLES
+// What a controller answers to a robot at rest on its reference: hold ARTIFACT ANGLE_RAD SAMPLES
 #include <exception>
 #include <iostream>
 #include <string>
@@ -7,8 +7,8 @@
 #include "quasilpv/controller.hpp"
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::cerr << "usage: hold ARTIFACT SAMPLES\n";
+  if (argc != 4) {
+    std::cerr << "usage: hold ARTIFACT ANGLE_RAD SAMPLES\n";
     return 2;
   }
   try {
@@ -16,7 +16,9 @@ int main(int argc, char** argv) {
     quasilpv::Controller controller(artifact);
     quasilpv::StepReport report;
     quasilpv::StepInput input;
-    for (const int samples = std::stoi(argv[2]); input.seq < samples; ++input.seq) {
+    input.angle.fill(std::stod(argv[2]));
+    input.reference.angle = input.angle;
+    for (const int samples = std::stoi(argv[3]); input.seq < samples; ++input.seq) {
       report = controller.step(input);
     }
     std::cout.precision(17);

@@ -171,11 +171,12 @@ def test_when_a_project_asks_for_the_core_expect_the_answers_of_the_bindings_on_
     kept_design(DesignRequest.of("arm3", "pid", Specification()), folder=tmp_path / "cache")
     [file] = (tmp_path / "cache").rglob("artifact.json")
     controller = _runtime.Controller(_runtime.Artifact.load(str(file)))
-    rest = np.zeros(3)
+    rest, angle = np.zeros(3), np.full(3, 0.25)
     for seq in range(4):
-        report = controller.step(rest, rest, rest, rest, rest, seq)
-    said = [float(line) for line in run(program, file, "4", cwd=tmp_path).split()]
+        report = controller.step(angle, angle, rest, rest, rest, seq)
+    said = [float(line) for line in run(program, file, "0.25", "4", cwd=tmp_path).split()]
     assert said == report.torque_applied[:3].tolist()
+    assert all(torque > 0.0 for torque in said)  # against gravity
     assert not re.search(r"lcm|sodium|glib", run("ldd", program, cwd=tmp_path))
 
 
