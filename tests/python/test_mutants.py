@@ -95,8 +95,8 @@ SAMPLED_FEEDBACK = (
     Mutant("covariance 11", "[[P, closed, drive]", "[[P * 2, closed, drive]"),
     Mutant("covariance 12", "[[P, closed, drive]", "[[P, zeros(3, 3), drive]"),
     Mutant("covariance 13", "[[P, closed, drive]", "[[P, closed, zeros(3, 1)]"),
-    Mutant("covariance 22", "[None, P, zeros(3, 1)]", "[None, P * 2, zeros(3, 1)]"),
-    Mutant("covariance 23", "[None, P, zeros(3, 1)]", "[None, P, drive]"),
+    Mutant("covariance 22", "[None, P, zeros(size, 1)]", "[None, P * 2, zeros(size, 1)]"),
+    Mutant("covariance 23", "[None, P, zeros(size, 1)]", "[None, P, drive]"),
     Mutant("covariance 33", "np.array([[1]])", "np.array([[2]])"),
 )
 

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from quasilpv.cli.session import Session
     from quasilpv.experiments.hil import HilResult, RealTimeOptions
     from quasilpv.experiments.result import TrackResult, Variant
-    from quasilpv.experiments.setup import RunSetup
     from quasilpv.scenarios import TrackingExperiment
 
 LATENCIES = ("wakeup_ns", "round_trip_ns")
@@ -122,6 +121,7 @@ def _run_both(
 ) -> tuple[HilResult, TrackResult]:
     """The run over LCM, in lock-step without options of real time, and the same in this process."""
     from quasilpv.experiments.hil import run_over_lcm
+    from quasilpv.experiments.setup import RunSetup
 
     with progress(2) as steps:
         steps.begin("in process")
