@@ -17,10 +17,11 @@ from quasilpv.synthesis import CONTROLLERS
 WRONG_USES = {
     "trakc serial-square": f"command line: verb: got trakc, expected one of {', '.join(VERBS)}; did you mean track?",
     "list --colour": "command line: option: got --colour, expected one of --json, --help, -h (design list --help)",
-    "synth": "command line: ROBOT: got nothing, expected robot id, see design list (design synth --help)",
+    "synth": "command line: ROBOT: got nothing, expected robot id, see design list, or a robot.toml: "
+    "design robot show (design synth --help)",
     "synth arm3 --rate-hz fast": "command line: --rate-hz: got fast, expected a number (design synth --help)",
     "synth arm9": "robots: robot: got arm9, expected one of arm2, arm3, arm2-upright, arm3-light, fivebar, "
-    "spring-disc; did you mean arm3?",
+    "spring-disc, ur5; did you mean arm3?",
     "synth arm3 --rate-hz -5": "specification: rate_hz: got -5.0, expected a number in [50, 50000]",
     "verify missing.json": "missing.json: file: got No such file or directory, expected a readable file",
     "hil serial-square serial-circle": "command line: arguments: got serial-circle too, expected no more than SCENARIO "
