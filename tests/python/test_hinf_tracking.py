@@ -101,7 +101,7 @@ def test_when_states_and_payloads_are_drawn_expect_the_torque_as_a_sum_of_unknow
 def test_when_the_checker_bounds_the_unknown_terms_itself_expect_those_of_the_design() -> None:
     for robot_id in ("arm2", "arm3", "fivebar"):
         arm = robot(robot_id)
-        content = release(robot_id, "pid").artifact.content()
+        content = release(DesignRequest.of(robot_id, "pid", Specification())).artifact.content()
         terms, unknown = unknown_terms(read_shipped(content), rational(arm.friction_bound_nm_s)), unknown_torques(arm)
         assert len(terms) == len(unknown.radius)
         for k, term in enumerate(terms):
