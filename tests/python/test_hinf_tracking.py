@@ -102,7 +102,7 @@ def test_when_the_checker_bounds_the_unknown_terms_itself_expect_those_of_the_de
     for robot_id in ("arm2", "arm3", "fivebar"):
         arm = robot(robot_id)
         content = release(DesignRequest.of(robot_id, "pid", Specification())).artifact.content()
-        terms, unknown = unknown_terms(read_shipped(content), rational(arm.friction_bound_nm_s)), unknown_torques(arm)
+        terms, unknown = unknown_terms(read_shipped(content), rational(friction_bound_nm_s(arm))), unknown_torques(arm)
         assert len(terms) == len(unknown.radius)
         for k, term in enumerate(terms):
             assert float(term.radius.p) / float(term.radius.q) == pytest.approx(unknown.radius[k], rel=1e-14)
