@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.certificate.laws.dob_acceleration import DobAccelerationLaw
 from quasilpv.conditions.tracking.sampled_chains import ChainGains
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.progress import Progress, no_progress
@@ -84,11 +85,11 @@ def tree_acceleration_law(
     feedback, observer = search.gains_of_best()
     kp, kd, ki = (float(gain) for gain in best.law.feedback)
     return TrackingDesign(
-        controller="dob-acceleration",
+        controller=DobAccelerationLaw.tag(),
         robot=robot,
         sample_period_s=specification.sample_period_s,
         law={
-            "kind": "dob-acceleration",
+            "kind": DobAccelerationLaw.tag(),
             "feedback": {"kp": kp, "kd": kd, "ki": ki},
             "observer": [float(gain) for gain in best.law.observer],
             "filter_time_constant_s": best.law.filter_time_constant_s,
@@ -96,7 +97,7 @@ def tree_acceleration_law(
             **design_inertia(robot, best.inertia_scale),
         },
         expressions={},
-        inputs={"controller": "dob-acceleration", "specification": specification.to_document()},
+        inputs={"controller": DobAccelerationLaw.tag(), "specification": specification.to_document()},
         report=_report(best, specification, found, search.tried),
         witness=_witness(best, feedback, observer, found),
     )

@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.certificate.laws.ctc import CtcDobLaw, CtcLaw
+from quasilpv.certificate.laws.pid import PidLaw
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.loop_grid import LoopGrid
 from quasilpv.loops.velocity_law import VelocityLaw
@@ -125,7 +127,7 @@ def _pid(controller: str, robot: SpatialRobot, specification: Specification, pro
     gains = zip(("kp", "kd", "ki"), best.tuning.unit_gains(), strict=True)
     per_joint = best.tuning.inertia_scale * driven
     law = {
-        "kind": "pid",
+        "kind": PidLaw.tag(),
         **{name: (gain * per_joint).tolist() for name, gain in gains},
         "velocity_filter_time_constant_s": best.tuning.velocity_filter_time_constant_s,
         **design_inertia(robot, 1.0),
@@ -144,7 +146,7 @@ def _computed_torque(
     gains = zip(("gp", "gd", "gi"), best.tuning.unit_gains(), strict=True)
     observer = best.tuning.observer_bandwidth_rad_s
     law = {
-        "kind": "ctc-dob" if observer > 0.0 else "ctc",
+        "kind": (CtcDobLaw if observer > 0.0 else CtcLaw).tag(),
         **{name: [gain] * robot.tree.order for name, gain in gains},
         "velocity_filter_time_constant_s": best.tuning.velocity_filter_time_constant_s,
         "disturbance_observer_bandwidth_rad_s": observer,
