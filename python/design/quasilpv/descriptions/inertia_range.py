@@ -16,6 +16,7 @@ import numpy as np
 from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.chain import ChainForm, ChainJoint, prove_chain
 from quasilpv.certificate.exact.matrices import matrix, rational
+from quasilpv.synthesis.chain_range import inertia_pairing
 from quasilpv.synthesis.chain_storages import InertiaPairing, Side, find_storages
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
 from quasilpv.systems.robots.tree import KinematicTree
@@ -55,7 +56,7 @@ def proved_inertia_range(robot: SpatialRobot, design: KinematicTree | None = Non
     find, check, cells = 0.0, 0.0, 0
     for side, true in sides.items():
         began = time.perf_counter()
-        pairing = _pairing(nominal, true)
+        pairing = inertia_pairing(nominal, true)
         found = find_storages(pairing, side)
         find += time.perf_counter() - began
         if found is None:
@@ -73,16 +74,6 @@ def proved_inertia_range(robot: SpatialRobot, design: KinematicTree | None = Non
     lowest, highest = bounds
     needed = None if lowest is None or highest is None else (lowest, highest)
     return InertiaRange(needed, _sampled(nominal, sides), find, check, cells)
-
-
-def _pairing(design: KinematicTree, true: Sequence[KinematicTree]) -> InertiaPairing:
-    """The inertias as matrices; robots that differ in their last body only are one set."""
-    bodies = [
-        np.unique(np.array([robot.joints[k].inertia.matrix for robot in true]), axis=0) for k in range(design.order)
-    ]
-    assert all(len(body) == 1 for body in bodies[:-1])
-    own = np.array([joint.inertia.matrix for joint in design.joints])
-    return InertiaPairing(design, own, design.rotor_inertias, bodies, true[0].rotor_inertias)
 
 
 def _form(pairing: InertiaPairing, side: Side, bound: float) -> ChainForm:

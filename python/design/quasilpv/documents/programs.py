@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from quasilpv.arrays import FloatArray
 from quasilpv.documents.strict_model import LARGEST_NUMBER, FieldError, StrictModel
 from quasilpv.errors import InputError
 
@@ -22,8 +23,6 @@ MAX_STACK = 64
 MAX_LENGTH = 4096
 MAX_POWER = 16
 MAX_JOINTS = 7
-
-Array = npt.NDArray[np.float64]
 
 
 def sinc(x: Any) -> Any:
@@ -133,7 +132,7 @@ def evaluate(
     angle: npt.ArrayLike,
     speed: npt.ArrayLike | None = None,
     reference_speed: npt.ArrayLike | None = None,
-) -> Array:
+) -> FloatArray:
     """Evaluate a program, instruction by instruction, with nothing reassociated.
 
     Args:
@@ -149,7 +148,7 @@ def evaluate(
         InputError: an input that the program reads is missing or has too few joints.
     """
     values = {"angle": angle, "speed": speed, "reference_speed": reference_speed}
-    arrays: dict[str, Array] = {}
+    arrays: dict[str, FloatArray] = {}
     for variable, highest in program.inputs().items():
         if values[variable] is None:
             raise InputError("program", variable, "nothing", f"at least {highest + 1} joints, which the code reads")

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from quasilpv.synthesis.chain_storages import InertiaPairing, find_storages
+from quasilpv.arrays import FloatArray
+from quasilpv.errors import InfeasibleError
+from quasilpv.synthesis.chain_storages import InertiaPairing, Side, find_storages
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
 from quasilpv.systems.robots.tree import KinematicTree
-
-FloatArray = npt.NDArray[np.float64]
 
 TRIVIAL_SPARE = 1e-6
 """Of a lower bound that needs no storage, relative."""
@@ -54,22 +53,22 @@ class ChainRange:
         }
 
 
-def find_range(robot: SpatialRobot, design: KinematicTree) -> ChainRange | None:
+def find_range(robot: SpatialRobot, design: KinematicTree) -> ChainRange:
     """Find bounds and storages for all robots of a set.
 
     Args:
         robot: with its payload and tolerances.
         design: whose inertia is M_n; the same chain.
 
-    Returns:
-        None if the solver has no answer.
+    Raises:
+        InfeasibleError: the solver has no answer.
     """
     began = time.perf_counter()
     lightest, heaviest = robot.lightest(), robot.heaviest()
     lowest = _without_storages(design, lightest) or _found(inertia_pairing(design, [lightest]), "lowest")
     highest = _found(inertia_pairing(design, heaviest), "highest")
     if lowest is None or highest is None:
-        return None
+        raise InfeasibleError(f"{robot.id}: no bounds of the inertia were found: the solver has no answer")
     return ChainRange(lowest, highest, time.perf_counter() - began)
 
 
@@ -83,7 +82,7 @@ def inertia_pairing(design: KinematicTree, true: Sequence[KinematicTree]) -> Ine
     return InertiaPairing(design, own, design.rotor_inertias, bodies, true[0].rotor_inertias)
 
 
-def _found(pairing: InertiaPairing, side: Any) -> ChainSide | None:
+def _found(pairing: InertiaPairing, side: Side) -> ChainSide | None:
     found = find_storages(pairing, side)
     return None if found is None else ChainSide(found.bound, found.matrices)
 

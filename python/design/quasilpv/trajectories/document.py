@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from quasilpv.arrays import FloatArray
 from quasilpv.documents.canonical import (
     Document,
     canonical_cbor,
@@ -26,7 +27,6 @@ from quasilpv.errors import InputError
 from quasilpv.files import read_bytes, write_atomically
 from quasilpv.trajectories.quintics import least_jerk, quintic_hermite
 
-Array = npt.NDArray[np.float64]
 Quintic = tuple[Number, Number, Number, Number, Number, Number]
 
 CONTINUITY_TOLERANCE = 1e-9
@@ -35,9 +35,9 @@ CONTINUITY_TOLERANCE = 1e-9
 class Reference(NamedTuple):
     """Reference angle, rad, speed, rad/s, and acceleration, rad/s^2: (n,) at one time or (times, n)."""
 
-    angle: Array
-    speed: Array
-    acceleration: Array
+    angle: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
 
 
 class TrajectoryModel(StrictModel):
@@ -81,8 +81,8 @@ class Trajectory:
     """
 
     name: str
-    knots_s: Array
-    coefficients: Array
+    knots_s: FloatArray
+    coefficients: FloatArray
     task: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:

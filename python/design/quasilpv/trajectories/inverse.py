@@ -20,15 +20,13 @@ from functools import cached_property, partial
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.mechanism import PlanarMechanism
 from quasilpv.systems.robots.spatial import Placement
 from quasilpv.systems.robots.tree import KinematicTree
 from quasilpv.trajectories.document import Reference
-
-Array = npt.NDArray[np.float64]
 
 MOST_STEPS = 60
 SMALLEST_STEP = 2.0**-12
@@ -50,8 +48,8 @@ class ToolTask:
     """What the tool is to do at one instant: a pose in the map's own form, and its first two derivatives (m,)."""
 
     pose: Any
-    velocity: Array
-    acceleration: Array
+    velocity: FloatArray
+    acceleration: FloatArray
 
 
 class ToolMap(Protocol):
@@ -66,16 +64,16 @@ class ToolMap(Protocol):
         """n."""
 
     @property
-    def scale(self) -> Array:
+    def scale(self) -> FloatArray:
         """Units of the rows, (m,): the length of the arm for positions, 1 for angles."""
 
-    def missing(self, q: Array, pose: Any) -> Array:
+    def missing(self, q: FloatArray, pose: Any) -> FloatArray:
         """What separates the tool from a pose, (m,): zero where it is there, J dq to first order elsewhere."""
 
-    def jacobian(self, q: Array) -> Array:
+    def jacobian(self, q: FloatArray) -> FloatArray:
         """J, (m, n)."""
 
-    def drift(self, q: Array, speed: Array) -> Array:
+    def drift(self, q: FloatArray, speed: FloatArray) -> FloatArray:
         """J' q', (m,)."""
 
 
@@ -97,21 +95,21 @@ class PlanarTool:
         return self.mechanism.joints
 
     @cached_property
-    def scale(self) -> Array:
+    def scale(self) -> FloatArray:
         """See `ToolMap`."""
         steps = np.diff(self.mechanism.skeleton(np.zeros(self.joints)), axis=0)
         reach = float(np.linalg.norm(steps, axis=1).sum())
         return np.array([reach, reach, 1.0][: self.rows])
 
-    def missing(self, q: Array, pose: Array) -> Array:
+    def missing(self, q: FloatArray, pose: FloatArray) -> FloatArray:
         """See `ToolMap`."""
         return np.asarray(pose - self.mechanism.forward_kinematics(q)[: self.rows])
 
-    def jacobian(self, q: Array) -> Array:
+    def jacobian(self, q: FloatArray) -> FloatArray:
         """See `ToolMap`."""
         return self.mechanism.jacobian(q)[: self.rows]
 
-    def drift(self, q: Array, speed: Array) -> Array:
+    def drift(self, q: FloatArray, speed: FloatArray) -> FloatArray:
         """See `ToolMap`."""
         return self.mechanism.jacobian_rate_times_speed(q, speed)[: self.rows]
 
@@ -134,26 +132,26 @@ class SpatialTool:
         return self.tree.order
 
     @cached_property
-    def scale(self) -> Array:
+    def scale(self) -> FloatArray:
         """See `ToolMap`."""
         return np.array([*[self.tree.reach_m] * 3, 1.0, 1.0, 1.0][: self.rows])
 
-    def missing(self, q: Array, pose: Placement) -> Array:
+    def missing(self, q: FloatArray, pose: Placement) -> FloatArray:
         """See `ToolMap`."""
         own = self.tree.tool_pose(q)
         away = pose.translation_m - own.translation_m
         return np.concatenate([away, rotation_vector(pose.rotation @ own.rotation.T)])[: self.rows]
 
-    def jacobian(self, q: Array) -> Array:
+    def jacobian(self, q: FloatArray) -> FloatArray:
         """See `ToolMap`."""
         return self.tree.tool_jacobian(q)[: self.rows]
 
-    def drift(self, q: Array, speed: Array) -> Array:
+    def drift(self, q: FloatArray, speed: FloatArray) -> FloatArray:
         """See `ToolMap`."""
         return self.tree.tool_drift(q, speed)[: self.rows]
 
 
-def rotation_vector(rotation: Array) -> Array:
+def rotation_vector(rotation: FloatArray) -> FloatArray:
     """Axis times angle, in [0, pi], of a rotation."""
     skew = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
     sine, cosine = np.linalg.norm(skew) / 2.0, (np.trace(rotation) - 1.0) / 2.0
@@ -172,7 +170,7 @@ Where: TypeAlias = Callable[[], tuple[str, str]]
 """Path and place in words, for a refusal."""
 
 
-def reached(tool: ToolMap, pose: Any, start: Array, where: Where) -> Array:
+def reached(tool: ToolMap, pose: Any, start: FloatArray, where: Where) -> FloatArray:
     """Joint coordinates that put the tool at a pose, reached from others; spare joints stay near those.
 
     Raises:
@@ -203,12 +201,12 @@ class JointPath:
     """
 
     tool: ToolMap
-    start: Array
-    held: Array
+    start: FloatArray
+    held: FloatArray
     source: str
 
     @classmethod
-    def of(cls, tool: ToolMap, start: Array, source: str) -> JointPath:
+    def of(cls, tool: ToolMap, start: FloatArray, source: str) -> JointPath:
         """The path that starts at these joint coordinates."""
         scaled = tool.jacobian(start) / tool.scale[:, None]
         return cls(tool, start, np.linalg.svd(scaled)[2][len(scaled) :], source)
@@ -239,7 +237,7 @@ class JointPath:
     def _where(self, place: Callable[[int], str], i: int) -> tuple[str, str]:
         return self.source, place(i)
 
-    def _regular(self, q: Array, where: Where) -> Array:
+    def _regular(self, q: FloatArray, where: Where) -> FloatArray:
         """[J; Z']. InputError: singular."""
         J = self.tool.jacobian(q)
         values = np.linalg.svd(np.vstack([J / self.tool.scale[:, None], self.held]), compute_uv=False)
@@ -250,11 +248,13 @@ class JointPath:
         return np.vstack([J, self.held])
 
 
-def _solved(tool: ToolMap, pose: Any, guess: Array, held: tuple[Array, Array], where: Where) -> Array:
+def _solved(
+    tool: ToolMap, pose: Any, guess: FloatArray, held: tuple[FloatArray, FloatArray], where: Where
+) -> FloatArray:
     """Newton's method on F, Z' and q_start given, each step halved until the residual shrinks (Deuflhard 2011)."""
     q, (rows, start) = guess, held
 
-    def residual(at: Array) -> Array:
+    def residual(at: FloatArray) -> FloatArray:
         return np.concatenate([tool.missing(at, pose) / tool.scale, rows @ (start - at)])
 
     gap = residual(q)

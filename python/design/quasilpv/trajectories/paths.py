@@ -15,14 +15,13 @@ from pathlib import Path
 from typing import Annotated, NamedTuple, Self
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from quasilpv.arrays import FloatArray
 from quasilpv.documents.canonical import parse_strict_json, require_bounded
 from quasilpv.documents.strict_model import FieldError, StrictModel, validate
 from quasilpv.files import read_bytes
 
-Array = npt.NDArray[np.float64]
 Point = tuple[float, float]
 Duration = Annotated[float, Field(gt=0)]
 
@@ -32,9 +31,9 @@ MAX_DURATION_S = 600.0
 class TaskMotion(NamedTuple):
     """Tool position (2), m, velocity (2), m/s, and acceleration (2), m/s^2, at one instant."""
 
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
 
 
 def septic(s: float) -> tuple[float, float, float]:
@@ -181,7 +180,7 @@ class Line:
     start: Point
     end: Point
 
-    def evaluate(self, progress: float) -> tuple[Array, Array, Array]:
+    def evaluate(self, progress: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the point at ``progress`` and its first two derivatives with respect to it."""
         start, end = np.array(self.start), np.array(self.end)
         return (1.0 - progress) * start + progress * end, end - start, np.zeros(2)
@@ -202,7 +201,7 @@ class Arc:
         point, _, _ = self.evaluate(1.0)
         return float(point[0]), float(point[1])
 
-    def evaluate(self, progress: float) -> tuple[Array, Array, Array]:
+    def evaluate(self, progress: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the point at ``progress`` and its first two derivatives with respect to it."""
         angle = self.start_angle_rad + progress * self.angle_rad
         radial = self.radius * np.array([math.cos(angle), math.sin(angle)])
@@ -224,7 +223,7 @@ class Spiral:
         point, _, _ = self.evaluate(1.0)
         return float(point[0]), float(point[1])
 
-    def evaluate(self, progress: float) -> tuple[Array, Array, Array]:
+    def evaluate(self, progress: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the point at ``progress`` and its first two derivatives with respect to it."""
         angle, turn = progress * self.angle_rad, self.angle_rad
         radial = self.radius * np.array([math.cos(angle), math.sin(angle)])

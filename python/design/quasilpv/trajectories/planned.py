@@ -8,14 +8,13 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.spatial import Placement
 from quasilpv.trajectories.document import Reference
 from quasilpv.trajectories.inverse import JointPath, ToolTask
 from quasilpv.trajectories.paths import TaskPath
 from quasilpv.trajectories.spatial_paths import SpatialCourse
-
-Array = npt.NDArray[np.float64]
 
 MIN_SINGULARITY = 0.05
 
@@ -39,16 +38,16 @@ class Kinematics(Protocol):
     def posture(self) -> tuple[float, ...]:
         """What the coordinates of the pose that no path states are kept at."""
 
-    def forward_kinematics(self, theta: npt.ArrayLike) -> Array:
+    def forward_kinematics(self, theta: npt.ArrayLike) -> FloatArray:
         """Pose of the tool, as many coordinates as joints."""
 
-    def inverse_kinematics(self, pose: npt.ArrayLike) -> Array:
+    def inverse_kinematics(self, pose: npt.ArrayLike) -> FloatArray:
         """Joint angles (n,); ``InputError`` if the pose is out of reach."""
 
-    def jacobian(self, theta: npt.ArrayLike) -> Array:
+    def jacobian(self, theta: npt.ArrayLike) -> FloatArray:
         """J, (n, n)."""
 
-    def jacobian_rate_times_speed(self, theta: npt.ArrayLike, omega: npt.ArrayLike) -> Array:
+    def jacobian_rate_times_speed(self, theta: npt.ArrayLike, omega: npt.ArrayLike) -> FloatArray:
         """J' theta', (n,)."""
 
     def singularity(self, theta: npt.ArrayLike) -> tuple[str, float]:
@@ -73,10 +72,10 @@ class Planned(Protocol):
     def place(self, time_s: float) -> str:
         """Where the tool is at a time, in words."""
 
-    def motion(self, times_s: Array) -> Reference:
+    def motion(self, times_s: FloatArray) -> Reference:
         """Of the joints, (times, n)."""
 
-    def errors(self, times_s: Array, angles: Array) -> tuple[float, float]:
+    def errors(self, times_s: FloatArray, angles: FloatArray) -> tuple[float, float]:
         """Largest distance from the path, m, and from orientation and posture, rad, at angles (times, n)."""
 
     def document(self) -> dict[str, Any]:
@@ -84,10 +83,9 @@ class Planned(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedForm:
-    """A path of an arm whose inverse kinematics is a formula."""
+class _InPlane:
+    """What is known of a path in the plane before anybody follows it."""
 
-    arm: Kinematics
     path: TaskPath
     source: str
 
@@ -105,11 +103,18 @@ class ClosedForm:
         """See `Planned`."""
         return place_of(self.path, time_s)
 
-    def motion(self, times_s: Array) -> Reference:
+
+@dataclass(frozen=True, eq=False)
+class ClosedForm(_InPlane):
+    """A path of an arm whose inverse kinematics is a formula."""
+
+    arm: Kinematics
+
+    def motion(self, times_s: FloatArray) -> Reference:
         """See `Planned`."""
         return joint_motion(self.arm, self.path, times_s, self.source)
 
-    def errors(self, times_s: Array, angles: Array) -> tuple[float, float]:
+    def errors(self, times_s: FloatArray, angles: FloatArray) -> tuple[float, float]:
         """See `Planned`."""
         poses = np.array([self.arm.forward_kinematics(angle) for angle in angles])
         turned = np.abs(poses[:, 2:] - np.array([*self.path.orientation, *self.arm.posture]))
@@ -121,28 +126,12 @@ class ClosedForm:
 
 
 @dataclass(frozen=True, eq=False)
-class PlanarPlan:
+class PlanarPlan(_InPlane):
     """A path of a planar arm solved by Newton's method."""
 
     joints: JointPath
-    path: TaskPath
-    source: str
 
-    @property
-    def name(self) -> str:
-        """See `Planned`."""
-        return self.path.name
-
-    @property
-    def segment_times_s(self) -> tuple[float, ...]:
-        """See `Planned`."""
-        return self.path.segment_times_s
-
-    def place(self, time_s: float) -> str:
-        """See `Planned`."""
-        return place_of(self.path, time_s)
-
-    def motion(self, times_s: Array) -> Reference:
+    def motion(self, times_s: FloatArray) -> Reference:
         """See `Planned`."""
         at_rest = np.zeros(len(self.path.orientation))
         tasks = []
@@ -152,7 +141,7 @@ class PlanarPlan:
             tasks.append(ToolTask(pose, np.append(task.velocity, at_rest), np.append(task.acceleration, at_rest)))
         return self.joints.motion(tasks, lambda i: self.place(times_s[i]))
 
-    def errors(self, times_s: Array, angles: Array) -> tuple[float, float]:
+    def errors(self, times_s: FloatArray, angles: FloatArray) -> tuple[float, float]:
         """See `Planned`."""
         poses = [np.array([*self.path.evaluate(float(t)).position, *self.path.orientation]) for t in times_s]
         away = np.array([self.joints.tool.missing(q, pose) for q, pose in zip(angles, poses, strict=True)])
@@ -188,7 +177,7 @@ class SpatialPlan:
         segment = self.course.segment_at(time_s)
         return f"segments[{segment}] at t = {time_s:.4g} s, (X, Y, Z) = ({x:.4g}, {y:.4g}, {z:.4g}) m"
 
-    def motion(self, times_s: Array) -> Reference:
+    def motion(self, times_s: FloatArray) -> Reference:
         """See `Planned`."""
         rows, tasks = len(self.joints.tool.scale), []
         for time in times_s:
@@ -198,7 +187,7 @@ class SpatialPlan:
             tasks.append(ToolTask(Placement(tool.rotation, tool.position), velocity, acceleration))
         return self.joints.motion(tasks, lambda i: self.place(times_s[i]))
 
-    def errors(self, times_s: Array, angles: Array) -> tuple[float, float]:
+    def errors(self, times_s: FloatArray, angles: FloatArray) -> tuple[float, float]:
         """See `Planned`."""
         tools = [self.course.evaluate(float(time)) for time in times_s]
         poses = [Placement(tool.rotation, tool.position) for tool in tools]
@@ -211,7 +200,7 @@ class SpatialPlan:
         return {"path": self.course.path.model_dump(mode="json", exclude_none=True), "robot": self.joints.tool.name}
 
 
-def joint_motion(arm: Kinematics, path: TaskPath, times_s: Array, source: str) -> Reference:
+def joint_motion(arm: Kinematics, path: TaskPath, times_s: FloatArray, source: str) -> Reference:
     """Return angles, speeds and accelerations (times, n) of the exact inverse kinematics, angles without jumps of 2 pi.
 
     Raises:
@@ -239,7 +228,7 @@ def joint_motion(arm: Kinematics, path: TaskPath, times_s: Array, source: str) -
     return Reference(np.unwrap(np.array(angles), axis=0), np.array(speeds), np.array(accelerations))
 
 
-def _distance(path: TaskPath, times_s: Array, poses: Array) -> float:
+def _distance(path: TaskPath, times_s: FloatArray, poses: FloatArray) -> float:
     positions = np.array([path.evaluate(float(time)).position for time in times_s])
     return float(np.linalg.norm(poses[:, :2] - positions, axis=1).max())
 

@@ -17,8 +17,8 @@ from itertools import pairwise
 from typing import TypeGuard
 
 import numpy as np
-import numpy.typing as npt
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.arm_parameters import OperatingDomain
 from quasilpv.systems.robots.arms import PlanarSerialArm
@@ -29,8 +29,6 @@ from quasilpv.trajectories.paths import TaskPath
 from quasilpv.trajectories.planned import ClosedForm, Kinematics, PlanarPlan, Planned, SpatialPlan, place_of
 from quasilpv.trajectories.quintics import quintic_hermite
 from quasilpv.trajectories.spatial_paths import SpatialPath
-
-Array = npt.NDArray[np.float64]
 
 KNOT_SPACING_S = 0.01
 FIT_TOLERANCE_M = 1e-9
@@ -72,7 +70,7 @@ def plan(
     if _is_solved_by_newton(arm, path):
         return _fitted(_newton_plan(arm, path, domain, source, posture_rad), domain, knot_spacing_s)
     _require_orientation(arm, path, source)
-    return _fitted(ClosedForm(arm, path, source), domain, knot_spacing_s)
+    return _fitted(ClosedForm(path, source, arm), domain, knot_spacing_s)
 
 
 def plan_in_space(
@@ -128,7 +126,7 @@ def _newton_plan(
     tool = PlanarTool(arm, rows)
     pose = np.array([*path.start, *path.orientation])
     start = reached(tool, pose, guess, lambda: (source, place_of(path, 0.0)))
-    return PlanarPlan(JointPath.of(tool, start, source), path, source)
+    return PlanarPlan(path, source, JointPath.of(tool, start, source))
 
 
 def _fitted(planned: Planned, domain: OperatingDomain | None, knot_spacing_s: float) -> Trajectory:
@@ -162,14 +160,14 @@ def _require_orientation(arm: Kinematics, path: TaskPath, source: str) -> None:
         raise InputError(source, "tool_angle_rad", path.tool_angle_rad, expected)
 
 
-def _knots(times_s: Sequence[float], spacing_s: float) -> Array:
+def _knots(times_s: Sequence[float], spacing_s: float) -> FloatArray:
     """Equally spaced in each segment, its ends included."""
     counts = [int(np.ceil((end - start) / spacing_s * (1.0 - 1e-12))) for start, end in pairwise(times_s)]
     pieces = [np.linspace(times_s[i], times_s[i + 1], count + 1)[1:] for i, count in enumerate(counts)]
     return np.concatenate([[0.0], *pieces])
 
 
-def _require_inside(domain: OperatingDomain, planned: Planned, times_s: Array, motion: Reference) -> None:
+def _require_inside(domain: OperatingDomain, planned: Planned, times_s: FloatArray, motion: Reference) -> None:
     boxes = (("theta", "rad", motion.angle, domain.angle_rad), ("omega", "rad/s", motion.speed, domain.speed_rad_s))
     for symbol, unit, values, box in boxes:
         for joint, (lower, upper) in enumerate(box):

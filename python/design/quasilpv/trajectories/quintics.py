@@ -7,14 +7,14 @@ from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Motion: TypeAlias = tuple[Array, Array, Array]
+from quasilpv.arrays import FloatArray
+
+Motion: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 """Angles, speeds and accelerations at the knots, (knots, n) each."""
 
 
-def quintic_hermite(knots_s: Array, motion: Motion) -> Array:
+def quintic_hermite(knots_s: FloatArray, motion: Motion) -> FloatArray:
     """Return the coefficients (K, n, 6) of the quintics that take the motion of both ends of a segment.
 
     Differences of nearly equal values are divided by powers of the spacing, which in floating point would spoil the
@@ -43,7 +43,7 @@ def _hermite(h: Fraction, start: tuple[Fraction, ...], end: tuple[Fraction, ...]
     return [float(c) for c in (r0, v0, a0 / 2, cubic, quartic, quintic)]
 
 
-def least_jerk(times_s: Array, points: Array) -> Motion:
+def least_jerk(times_s: FloatArray, points: FloatArray) -> Motion:
     """The motion through points with the least integral of the squared jerk, at rest at both ends.
 
     It is the piecewise quintic whose third and fourth derivatives are continuous too (de Boor 1963): two linear

@@ -17,12 +17,13 @@ from typing import Annotated, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from quasilpv.arrays import FloatArray
 from quasilpv.documents.canonical import parse_strict_json, require_bounded
 from quasilpv.documents.strict_model import FieldError, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import read_bytes
 from quasilpv.systems.robots.spatial import Placement
-from quasilpv.trajectories.paths import MAX_DURATION_S, Array, Duration, septic
+from quasilpv.trajectories.paths import MAX_DURATION_S, Duration, septic
 
 Vector3 = tuple[float, float, float]
 
@@ -33,12 +34,12 @@ class ToolMotion(NamedTuple):
     Linear: position, m, velocity, acceleration. Angular: rotation matrix, angular velocity, rad/s, and acceleration.
     """
 
-    position: Array
-    velocity: Array
-    acceleration: Array
-    rotation: Array
-    angular_velocity: Array
-    angular_acceleration: Array
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    rotation: FloatArray
+    angular_velocity: FloatArray
+    angular_acceleration: FloatArray
 
 
 class SpatialLine(StrictModel):
@@ -147,9 +148,9 @@ class SpatialCourse:
         return tuple(times)
 
     @cached_property
-    def _pieces(self) -> tuple[tuple[_Line | _Arc, Array], ...]:
+    def _pieces(self) -> tuple[tuple[_Line | _Arc, FloatArray], ...]:
         """Every segment's curve, and the orientation the tool has at its start."""
-        pieces: list[tuple[_Line | _Arc, Array]] = []
+        pieces: list[tuple[_Line | _Arc, FloatArray]] = []
         point, rotation = self.start.translation_m, self.start.rotation
         for i, segment in enumerate(self.path.segments):
             curve = self._curve(segment, point, i)
@@ -157,7 +158,7 @@ class SpatialCourse:
             point, rotation = curve.evaluate(1.0)[0], _turned(segment.turn_rad, 1.0) @ rotation
         return tuple(pieces)
 
-    def _curve(self, segment: SpatialSegment, point: Array, index: int) -> _Line | _Arc:
+    def _curve(self, segment: SpatialSegment, point: FloatArray, index: int) -> _Line | _Arc:
         if segment.line is not None:
             line = segment.line
             return _Line(point, np.array(line.by) if line.to is None else np.array(line.to) - point)
@@ -198,22 +199,22 @@ class SpatialCourse:
 
 @dataclass(frozen=True, eq=False)
 class _Line:
-    start: Array
-    by: Array
+    start: FloatArray
+    by: FloatArray
 
-    def evaluate(self, progress: float) -> tuple[Array, Array, Array]:
+    def evaluate(self, progress: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The point at a progress in [0, 1], and two derivatives with respect to it."""
         return self.start + progress * self.by, self.by, np.zeros(3)
 
 
 @dataclass(frozen=True, eq=False)
 class _Arc:
-    centre: Array
-    radial: Array
-    tangential: Array
+    centre: FloatArray
+    radial: FloatArray
+    tangential: FloatArray
     angle_rad: float
 
-    def evaluate(self, progress: float) -> tuple[Array, Array, Array]:
+    def evaluate(self, progress: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The point at a progress in [0, 1], and two derivatives with respect to it."""
         turned = progress * self.angle_rad
         outwards = math.cos(turned) * self.radial + math.sin(turned) * self.tangential
@@ -233,7 +234,7 @@ def read_spatial_path(path: Path | str) -> SpatialPath:
     return validate(SpatialPath, document, source)
 
 
-def _turned(vector: Vector3, share: float) -> Array:
+def _turned(vector: Vector3, share: float) -> FloatArray:
     """The rotation by a share of a rotation vector."""
     angle = math.hypot(*vector)
     return np.eye(3) if angle == 0.0 else Placement.turned(np.array(vector) / angle, share * angle).rotation

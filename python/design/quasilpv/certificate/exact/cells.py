@@ -36,7 +36,8 @@ import numpy as np
 import numpy.typing as npt
 from flint import arb, ctx, fmpq
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
+from quasilpv.arrays import FloatArray
+
 IntegerArray: TypeAlias = npt.NDArray[Any]
 """Array of Python integers of any size."""
 

@@ -29,13 +29,12 @@ from dataclasses import dataclass
 from math import atan, comb, isfinite, pi
 
 import numpy as np
-import numpy.typing as npt
 from flint import arb, ctx, fmpq, fmpq_mat
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.matrices import identity, is_positive_definite, matrix, rational, stack, zero
 from quasilpv.certificate.exact.rationals import to_float, to_floats
 
-FloatArray = npt.NDArray[np.float64]
 Polynomial = tuple[fmpq_mat, ...]
 """Matrix coefficients of the powers of one variable."""
 

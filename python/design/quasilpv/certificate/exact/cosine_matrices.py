@@ -14,7 +14,8 @@ from typing import TypeAlias
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from quasilpv.certificate.exact.cells import FloatArray, Pencil
+from quasilpv.arrays import FloatArray
+from quasilpv.certificate.exact.cells import Pencil
 from quasilpv.certificate.exact.matrices import magnitude, zero
 from quasilpv.certificate.exact.rationals import to_floats
 

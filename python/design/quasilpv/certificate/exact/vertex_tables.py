@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from flint import fmpq, fmpq_mat
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.claims import Claim
 from quasilpv.certificate.exact.matrices import matrix, rational
 from quasilpv.documents.tables import PolytopeTable
@@ -22,7 +22,6 @@ from quasilpv.documents.tables import PolytopeTable
 COLLAPSE_TOLERANCE = fmpq(1, 1 << 40)
 """Largest error of a collapsed entry, relative to that entry's largest magnitude over the vertices: about 9e-13."""
 
-FloatArray = npt.NDArray[np.float64]
 Rows = Sequence[Sequence[float]]
 
 

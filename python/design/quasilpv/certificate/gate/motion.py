@@ -41,7 +41,8 @@ import numpy as np
 import numpy.typing as npt
 from flint import fmpq, fmpq_mat, fmpq_poly
 
-from quasilpv.certificate.exact.cells import FloatArray, prove_positive
+from quasilpv.arrays import FloatArray
+from quasilpv.certificate.exact.cells import prove_positive
 from quasilpv.certificate.exact.cosine_matrices import CosineMatrix
 from quasilpv.certificate.exact.matrices import is_positive_definite, is_symmetric, matrix, rational
 from quasilpv.certificate.exact.polynomials import CircleProduct, is_schur, roots_between

@@ -12,12 +12,12 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from flint import fmpq, fmpq_poly
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.claims import Evidence
 from quasilpv.certificate.exact.rationals import float_at_most, to_float
 from quasilpv.certificate.gate.delay import DelayMargin, delay_margin
@@ -35,8 +35,6 @@ from quasilpv.errors import InputError
 
 GROWTH_RATIOS = 61
 CURVE_POINTS = 41
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

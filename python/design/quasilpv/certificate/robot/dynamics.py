@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from quasilpv.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

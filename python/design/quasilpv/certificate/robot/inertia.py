@@ -14,15 +14,14 @@ from itertools import combinations, pairwise
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 from flint import fmpq, fmpq_mat, fmpq_poly
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.matrices import is_symmetric, magnitude, matrix, rational, zero
 from quasilpv.certificate.exact.rationals import to_floats
 from quasilpv.certificate.robot.mechanism import MechanismData
 from quasilpv.errors import InputError
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Pair: TypeAlias = tuple[int, int]
 Interval: TypeAlias = tuple[float, float]
 

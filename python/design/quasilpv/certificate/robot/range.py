@@ -17,7 +17,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from flint import fmpq, fmpq_mat, fmpq_poly
 
-from quasilpv.certificate.exact.cells import Cells, FloatArray, Pencil, cosine_enclosure, prove_positive
+from quasilpv.arrays import FloatArray
+from quasilpv.certificate.exact.cells import Cells, Pencil, cosine_enclosure, prove_positive
 from quasilpv.certificate.exact.cosine_matrices import CosineMatrix
 from quasilpv.certificate.exact.matrices import rational, zero
 from quasilpv.certificate.exact.rationals import float_at_least, float_at_most, to_float, to_floats

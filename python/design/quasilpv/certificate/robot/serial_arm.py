@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from flint import fmpq, fmpq_mat, fmpq_poly
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.matrices import diagonal, rational
-from quasilpv.certificate.robot.dynamics import FloatArray, Motion, Planar, planar_stiffness
+from quasilpv.certificate.robot.dynamics import Motion, Planar, planar_stiffness
 from quasilpv.certificate.robot.mechanism import LoadedLink, Polynomials
 from quasilpv.documents.mechanism import SerialArm
 

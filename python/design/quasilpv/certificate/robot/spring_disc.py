@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from flint import fmpq_mat, fmpq_poly
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.matrices import diagonal, identity, rational
-from quasilpv.certificate.robot.dynamics import FloatArray, Motion
+from quasilpv.certificate.robot.dynamics import Motion
 from quasilpv.certificate.robot.mechanism import Polynomials
 from quasilpv.documents.mechanism import SpringDisc
 

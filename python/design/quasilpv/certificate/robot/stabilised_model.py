@@ -18,7 +18,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from flint import arb, fmpq
 
 from quasilpv.certificate.exact.claims import Claim
@@ -34,8 +33,6 @@ from quasilpv.certificate.robot.equations_of_motion import (
     largest_state,
 )
 from quasilpv.certificate.robot.registry import numeric_robot
-
-FloatArray = npt.NDArray[np.float64]
 
 SCHEDULE = "schedule"
 ROUNDING = 1e-9

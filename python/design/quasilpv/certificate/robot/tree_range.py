@@ -13,9 +13,9 @@ from functools import cached_property
 from typing import Literal, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 from flint import fmpq
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.chain import ChainProof, prove_chain
 from quasilpv.certificate.exact.matrices import matrix, rational
 from quasilpv.certificate.exact.rationals import to_floats
@@ -23,7 +23,6 @@ from quasilpv.certificate.reading import Rows, WitnessDocument
 from quasilpv.certificate.robot.range import NeededRange, Place
 from quasilpv.certificate.robot.tree import TreeData, TreeInertia
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 Side: TypeAlias = Literal["lowest", "highest"]
 
 SAMPLES = 1500

@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from quasilpv.certificate.laws.dob_acceleration import DobAccelerationLaw
 from quasilpv.conditions.tracking.sampled_chains import ChainGains
-from quasilpv.errors import InfeasibleError, InputError
+from quasilpv.errors import InputError
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.search import BandwidthSearch, Candidate, Grid, growth_rates
 from quasilpv.synthesis.acceleration.tolerance import FrozenTolerance
@@ -29,8 +28,6 @@ from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
 from quasilpv.systems.robots.tree import KinematicTree
 from quasilpv.systems.robots.tree_mechanism import TreeMechanism
-
-FloatArray = npt.NDArray[np.float64]
 
 GRID = Grid(
     feedback=tuple(float(w) for w in np.geomspace(0.01, 0.28, 13)),
@@ -68,8 +65,6 @@ def tree_acceleration_law(
     """
     _require_delay_only(robot)
     found = find_range(robot, robot.tree)
-    if found is None:
-        raise InfeasibleError(f"{robot.id}: no bounds of the inertia were found: the solver has no answer")
     needed = _Range(found.lowest.bound, found.highest.bound)
     search = BandwidthSearch(
         robot.id,

@@ -16,25 +16,21 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from quasilpv.certificate.laws.ctc import CtcDobLaw, CtcLaw
+from quasilpv.arrays import FloatArray
+from quasilpv.certificate.laws.ctc import CtcLaw
 from quasilpv.certificate.laws.pid import PidLaw
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.loop_grid import LoopGrid
-from quasilpv.loops.velocity_law import VelocityLaw
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.tree_law import POSTURES, SEED, design_inertia, largest_row
-from quasilpv.synthesis.baselines.printed import Tuning
-from quasilpv.synthesis.baselines.tuned import COMPUTED_TORQUE, WITH_OBSERVER
+from quasilpv.synthesis.baselines.tuned import COMPUTED_TORQUE, computed_torque_law
 from quasilpv.synthesis.baselines.tuning_search import LARGEST, Axes, Candidate, TuningSearch
 from quasilpv.synthesis.chain_range import find_range
 from quasilpv.synthesis.plant_grid import PlantGrid
 from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
-
-FloatArray = npt.NDArray[np.float64]
 
 RATIOS = 5
 """Scalar loops, geometrically spaced over the range."""
@@ -46,7 +42,6 @@ LARGEST_IN_SPACE = {
     **LARGEST,
     "bandwidth": 0.5,
     "filter_time": 100.0,
-    "observer_bandwidth": 0.5,
     "inertia_scale": 10.0,
 }
 """Where the descent ends, in the units of the axes."""
@@ -59,7 +54,6 @@ AXES: Mapping[str, Axes] = {
         "inertia_scale": tuple(float(s) for s in np.geomspace(0.3, 4.0, 5)),
     },
     "ctc-tuned": COMPUTED_TORQUE,
-    "ctc-dob-tuned": WITH_OBSERVER,
 }
 """Coarse grids, as those of `quasilpv.synthesis.baselines.tuned`."""
 
@@ -94,36 +88,9 @@ def pid_gravity_tuned(
     robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
 ) -> TrackingDesign:
     """PID with gravity. InfeasibleError: no point of the search meets the specification."""
-    return _pid("pid-tuned", robot, specification, progress)
-
-
-def computed_torque_tuned(
-    robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
-) -> TrackingDesign:
-    """Computed torque. InfeasibleError: no point of the search meets the specification."""
-    return _computed_torque("ctc-tuned", robot, specification, progress)
-
-
-def computed_torque_with_observer_tuned(
-    robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
-) -> TrackingDesign:
-    """Computed torque with observer. InfeasibleError: no point of the search meets the specification."""
-    return _computed_torque("ctc-dob-tuned", robot, specification, progress)
-
-
-def scalar_law(robot: SpatialRobot, tuning: Tuning, nominal: FloatArray, period: float) -> VelocityLaw:
-    """The law of one joint of unit inertia, (B, 1, 1); the period is in s."""
-    del robot
-    inertia = tuning.inertia_scale * nominal
-    kp, kd, ki = (gain * inertia for gain in tuning.unit_gains())
-    filter_time, observer = tuning.velocity_filter_time_constant_s, tuning.observer_bandwidth_rad_s
-    return VelocityLaw(period, kp, kd, ki, inertia, filter_time, observer)
-
-
-def _pid(controller: str, robot: SpatialRobot, specification: Specification, progress: Progress) -> TrackingDesign:
     driven, lowest, highest = _driven_inertia(robot)
     row = float((driven / np.array(robot.limits.torque_nm)).max())
-    best = _best(controller, robot, specification, progress, (lowest, highest, row))
+    best = _best("pid-tuned", robot, specification, progress, (lowest, highest, row))
     gains = zip(("kp", "kd", "ki"), best.tuning.unit_gains(), strict=True)
     per_joint = best.tuning.inertia_scale * driven
     law = {
@@ -132,27 +99,25 @@ def _pid(controller: str, robot: SpatialRobot, specification: Specification, pro
         "velocity_filter_time_constant_s": best.tuning.velocity_filter_time_constant_s,
         **design_inertia(robot, 1.0),
     }
-    return _designed(controller, robot, specification, law, best)
+    return _designed("pid-tuned", robot, specification, law, best)
 
 
-def _computed_torque(
-    controller: str, robot: SpatialRobot, specification: Specification, progress: Progress
+def computed_torque_tuned(
+    robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
 ) -> TrackingDesign:
+    """Computed torque. InfeasibleError: no point of the search meets the specification, or no bounds were found."""
     found = find_range(robot, robot.tree)
-    if found is None:
-        raise InfeasibleError(f"{robot.id}: no bounds of the inertia were found: the solver has no answer")
     bounds = found.lowest.bound, found.highest.bound, largest_row(robot)
-    best = _best(controller, robot, specification, progress, bounds)
+    best = _best("ctc-tuned", robot, specification, progress, bounds)
     gains = zip(("gp", "gd", "gi"), best.tuning.unit_gains(), strict=True)
-    observer = best.tuning.observer_bandwidth_rad_s
     law = {
-        "kind": (CtcDobLaw if observer > 0.0 else CtcLaw).tag(),
+        "kind": CtcLaw.tag(),
         **{name: [gain] * robot.tree.order for name, gain in gains},
         "velocity_filter_time_constant_s": best.tuning.velocity_filter_time_constant_s,
-        "disturbance_observer_bandwidth_rad_s": observer,
+        "disturbance_observer_bandwidth_rad_s": 0.0,
         **design_inertia(robot, best.tuning.inertia_scale),
     }
-    return _designed(controller, robot, specification, law, best)
+    return _designed("ctc-tuned", robot, specification, law, best)
 
 
 def _best(
@@ -166,7 +131,9 @@ def _best(
     axes = AXES[controller]
     ratios = np.geomspace(lowest, highest, RATIOS)[:, None, None]
     plants = PlantGrid(np.zeros((RATIOS, 1)), np.ones((RATIOS, 1, 1)), {1.0: ratios})
-    search = TreeTuningSearch(robot, specification, scalar_law, axes, plants, progress, LARGEST_IN_SPACE, row=row)
+    search = TreeTuningSearch(
+        robot, specification, computed_torque_law, axes, plants, progress, LARGEST_IN_SPACE, row=row
+    )
     found = search.run()
     if not found:
         about = f"{robot.id}: no {controller} design at {specification.rate_hz:g} Hz"

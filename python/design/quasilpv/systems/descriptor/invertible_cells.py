@@ -14,14 +14,13 @@ from itertools import product
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from quasilpv.arrays import FloatArray
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.premise import AffineMatrix
 from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.intervals.enclosure import IntervalFunction, halves
 
-FloatArray = NDArray[np.float64]
 Box = tuple[tuple[float, float], ...]
 
 MOST_CELLS = 3000

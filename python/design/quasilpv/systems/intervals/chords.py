@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from quasilpv.arrays import FloatArray
 
 _SMALL = 1e-5  # below it the slope in the middle of a chord is nearer to its mean than the rounded quotient
 
@@ -31,7 +31,7 @@ class Ramp(sp.Function):  # type: ignore[misc]  # sympy carries no annotations
         return sp.S.Zero if w.is_nonpositive else None
 
     @staticmethod
-    def _imp_(w: ArrayLike) -> Array:
+    def _imp_(w: ArrayLike) -> FloatArray:
         return np.asarray(np.maximum(np.asarray(w, dtype=float), 0.0))
 
 
@@ -49,7 +49,7 @@ class log_chord(Chord):  # noqa: N801 -- spelt like the function
     smoothness = "log"
 
     @staticmethod
-    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+    def _imp_(a: ArrayLike, w: ArrayLike) -> FloatArray:
         a, w = _arrays(a, w)
         return _quotient(np.log1p(w / a), w, 1 / a)
 
@@ -60,7 +60,7 @@ class tan_chord(Chord):  # noqa: N801
     smoothness = "tan"
 
     @staticmethod
-    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+    def _imp_(a: ArrayLike, w: ArrayLike) -> FloatArray:
         a, w = _arrays(a, w)
         return np.asarray(np.sinc(w / np.pi) / (np.cos(a) * np.cos(a + w)))
 
@@ -71,7 +71,7 @@ class atan_chord(Chord):  # noqa: N801
     smoothness = "atan"
 
     @staticmethod
-    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+    def _imp_(a: ArrayLike, w: ArrayLike) -> FloatArray:
         a, w = _arrays(a, w)
         return _stable(np.arctan, lambda x: 1 / (1 + x**2), a, w)
 
@@ -82,7 +82,7 @@ class asin_chord(Chord):  # noqa: N801
     smoothness = "asin"
 
     @staticmethod
-    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+    def _imp_(a: ArrayLike, w: ArrayLike) -> FloatArray:
         a, w = _arrays(a, w)
         return _stable(np.arcsin, lambda x: 1 / np.sqrt(1 - x**2), a, w)
 
@@ -93,7 +93,7 @@ class sinh_chord(Chord):  # noqa: N801
     smoothness = "sinh"
 
     @staticmethod
-    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+    def _imp_(a: ArrayLike, w: ArrayLike) -> FloatArray:
         a, w = _arrays(a, w)
         return np.asarray(_quotient(2 * np.sinh(w / 2), w, 1.0) * np.cosh(a + w / 2))
 
@@ -104,7 +104,7 @@ class cosh_chord(Chord):  # noqa: N801
     smoothness = "cosh"
 
     @staticmethod
-    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+    def _imp_(a: ArrayLike, w: ArrayLike) -> FloatArray:
         a, w = _arrays(a, w)
         return np.asarray(_quotient(2 * np.sinh(w / 2), w, 1.0) * np.sinh(a + w / 2))
 
@@ -115,7 +115,7 @@ class tanh_chord(Chord):  # noqa: N801
     smoothness = "tanh"
 
     @staticmethod
-    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+    def _imp_(a: ArrayLike, w: ArrayLike) -> FloatArray:
         a, w = _arrays(a, w)
         return np.asarray(_quotient(np.tanh(w), w, 1.0) * (1 - np.tanh(a) * np.tanh(a + w)))
 
@@ -126,7 +126,7 @@ class sinc_chord(Chord):  # noqa: N801
     smoothness = "sinc"
 
     @staticmethod
-    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+    def _imp_(a: ArrayLike, w: ArrayLike) -> FloatArray:
         a, w = _arrays(a, w)
         return _stable(lambda x: np.sinc(x / np.pi), _sinc_slope, a, w)
 
@@ -137,7 +137,7 @@ class abs_chord(Chord):  # noqa: N801
     smoothness = "abs"
 
     @staticmethod
-    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+    def _imp_(a: ArrayLike, w: ArrayLike) -> FloatArray:
         a, w = _arrays(a, w)
         return np.asarray(2 * ramp_chord._imp_(a, w) - 1)
 
@@ -148,7 +148,7 @@ class ramp_chord(Chord):  # noqa: N801
     smoothness = "ramp"
 
     @staticmethod
-    def _imp_(a: ArrayLike, w: ArrayLike) -> Array:
+    def _imp_(a: ArrayLike, w: ArrayLike) -> FloatArray:
         a, w = _arrays(a, w)
         b = a + w
         across = _quotient(np.maximum(a, b), np.abs(w), 0.5)
@@ -170,23 +170,23 @@ CHORDS: dict[Any, type[Chord]] = {
 """The chord of every function that is factored by one."""
 
 
-def _arrays(a: ArrayLike, w: ArrayLike) -> tuple[Array, Array]:
+def _arrays(a: ArrayLike, w: ArrayLike) -> tuple[FloatArray, FloatArray]:
     one, other = np.broadcast_arrays(np.asarray(a, dtype=float), np.asarray(w, dtype=float))
     return one, other
 
 
-def _quotient(difference: ArrayLike, w: Array, at_zero: ArrayLike) -> Array:
+def _quotient(difference: ArrayLike, w: FloatArray, at_zero: ArrayLike) -> FloatArray:
     """The quotient, or its limit."""
     return np.asarray(np.where(w == 0, at_zero, difference / np.where(w == 0, 1.0, w)))
 
 
-def _stable(function: Any, slope: Any, a: Array, w: Array) -> Array:
+def _stable(function: Any, slope: Any, a: FloatArray, w: FloatArray) -> FloatArray:
     """The quotient of rounded values, or the slope in the middle."""
     small = np.abs(w) < _SMALL
     return np.asarray(np.where(small, slope(a + w / 2), (function(a + w) - function(a)) / np.where(small, 1.0, w)))
 
 
-def _sinc_slope(x: Array) -> Array:
+def _sinc_slope(x: FloatArray) -> FloatArray:
     small = np.abs(x) < 1e-2
     safe = np.where(small, 1.0, x)
     return np.asarray(np.where(small, -x / 3 + x**3 / 30 - x**5 / 840, (np.cos(x) - np.sinc(x / np.pi)) / safe))

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from quasilpv.arrays import FloatArray
 from quasilpv.systems.robots.tree import KinematicTree
-
-FloatArray = NDArray[np.float64]
 
 COULOMB_SPEED_RAD_S = 0.01
 """Speed w0 in the smoothed Coulomb friction ``c tanh(w / w0)`` of simulated joints."""
