@@ -171,7 +171,7 @@ def test_what_is_proved_cell_by_cell_is_invertible_at_every_state() -> None:
         cells = cells_with_inverse(plant, plant.E, slice(0, plant.order))
         assert not (changes_sign and cells is not None), seed
         proved, singular = proved + (cells is not None), singular + changes_sign
-    assert min(proved, singular) >= 8
+    assert min(proved, singular) >= 5
 
 
 def test_inertias_of_wide_postures_are_invertible_although_the_box_of_cosines_holds_singular_ones() -> None:
