@@ -22,13 +22,13 @@ MARKER = re.compile(r"(?:[-*+]|\d+[.)]) +")
 KEPT = re.compile(r"\s*(?:[#|<]|\[[^\]]+\]:|\$\$|!\[|---|===|\(\w+\)=)")
 """Beginnings of lines that stay as they are: headings, tables, HTML, link targets, formulas, figures, rules."""
 
-ATOM = re.compile(r"`+[^`]+`+|!?\[[^\]]*\]\([^)]*\)|\$[^$]+\$|\*\*[^*]+\*\*(?=\S)|\S")
+ATOM = re.compile(r"`+[^`]+`+|!?\[[^\]]*\]\([^)]*\)|\$[^$]+\$|\S")
 """What is not broken: code, links, formulas."""
 
 ABBREVIATION = re.compile(r"(?:\b(?:e\.g|i\.e|cf|vs|al|[Ff]igs?|[Ee]qs?|approx|incl|ca|pp?|Sect?|Ch|No|Ex)|\b[A-Z])\.$")
 END = re.compile(r"[.!?][)\"'”*_`]*$")
 BEGIN = re.compile(r"[\"'“(*_`\[]*[A-Z0-9`$\[]")
-STRUCTURE = re.compile(r"(?:[-+*#>|=~]|\d+[.)]|`{3}|:{3})")
+STRUCTURE = re.compile(r"(?:[-+*]$|-{2}|[#>|=~]|\d+[.)]|`{3}|:{3})")
 """What would begin something else than prose at the beginning of a line."""
 
 
