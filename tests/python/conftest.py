@@ -12,4 +12,4 @@ settings.register_profile("full", deadline=None, max_examples=1000, print_blob=T
 settings.load_profile("quick")
 
 # The helpers of the tests with real processes hold fixtures and assertions.
-pytest.register_assert_rewrite("two_processes")
+pytest.register_assert_rewrite("two_processes", "reference.logged_run")
