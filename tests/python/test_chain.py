@@ -240,7 +240,7 @@ def test_a_notebook_is_shown_numbers_and_nothing_is_drawn_for_it(
 ) -> None:
     monkeypatch.setattr("matplotlib.figure.Figure.__init__", lambda *_, **__: pytest.fail("a figure is made"))
     shown = run._repr_html_()
-    assert f"{1e3 * run.metrics.rms_x_m:.3g} mm" in shown
+    assert f"{1e3 * run.metrics.rms_tool_m:.3g} mm" in shown
     assert "<table>" in shown
     assert not hasattr(run, "_repr_png_")
 

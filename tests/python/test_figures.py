@@ -53,6 +53,13 @@ def test_when_controllers_are_compared_expect_no_text_cut_or_over_another() -> N
     assert_readable(comparison_figure(all_results()))
 
 
+def test_when_the_tool_errs_along_a_third_axis_expect_the_comparison_to_count_it() -> None:
+    results = all_results()
+    tall = [replace(r, metrics=replace(r.metrics, rms_z_m=0.02, rms_tool_m=0.03 + k)) for k, r in enumerate(results)]
+    bars = comparison_figure(tall).axes[1].patches
+    assert [bar.get_width() for bar in bars] == pytest.approx([1e3 * (0.03 + k) for k in range(len(results))])
+
+
 @pytest.mark.parametrize("draw", SINGLE)
 def test_when_a_figure_is_drawn_expect_units_on_every_labelled_axis(draw: Callable[[TrackResult], Figure]) -> None:
     for axes in draw(default_result()).axes:

@@ -226,13 +226,20 @@ class Simulation:
 
     def _numbers(self) -> dict[str, str]:
         metrics = self.metrics
-        return {
-            "rms error of the tool": f"{1e3 * metrics.rms_x_m:.3g} mm in X, {1e3 * metrics.rms_y_m:.3g} mm in Y",
-            "largest error": f"{1e3 * metrics.mav_x_m:.3g} mm in X, {1e3 * metrics.mav_y_m:.3g} mm in Y",
+        axes = {"X": metrics.rms_x_m, "Y": metrics.rms_y_m, "Z": metrics.rms_z_m}
+        along = ", ".join(f"{1e3 * rms:.3g} in {axis}" for axis, rms in axes.items() if rms is not None)
+        numbers = {
+            "rms error of the tool": f"{1e3 * metrics.rms_tool_m:.3g} mm ({along})",
+            "largest error": f"{1e3 * metrics.max_tool_m:.3g} mm",
             "torque": f"{metrics.rms_torque_nm:.3g} N m rms, {metrics.rms_torque_increment_nm:.3g} N m per sample",
             "at a limit": f"{100.0 * metrics.share_at_limit:.3g} % of the samples",
-            "premises outside their box": f"by up to {metrics.largest_premise_excess or 0.0:.3g} of its width",
         }
+        excess = metrics.largest_premise_excess
+        return (
+            numbers
+            if excess is None
+            else numbers | {"premises outside their box": f"by up to {excess:.3g} of its width"}
+        )
 
 
 def design(

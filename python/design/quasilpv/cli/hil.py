@@ -161,17 +161,18 @@ def _row(over_lcm: HilResult, in_process: TrackResult) -> dict[str, Any]:
 
 
 def _print(over_lcm: HilResult, in_process: TrackResult) -> None:
-    from quasilpv.cli.results import COLUMNS, cells
+    from quasilpv.cli.results import layout
 
     title = f"{in_process.title}, {in_process.plant} plant, {in_process.rate_hz:g} Hz"
-    columns = ("", *COLUMNS[1:])
-    print_table(title, columns, [cells(in_process, "in process"), cells(over_lcm.result, f"over LCM, {over_lcm.mode}")])
+    columns, cells = layout(in_process)
+    rows = [cells(in_process, "in process"), cells(over_lcm.result, f"over LCM, {over_lcm.mode}")]
+    print_table(title, ("", *columns[1:]), rows)
     latencies = {name: over_lcm.simulator[name] for name in LATENCIES if over_lcm.simulator[name] is not None}
-    rows = [
+    waits = [
         (name.removesuffix("_ns").replace("_", " "), *(f"{latency[q] / 1e3:.1f}" for q in QUANTILES))
         for name, latency in latencies.items()
     ]
-    print_table("latency at the plant, us", ("", *QUANTILES), rows)
+    print_table("latency at the plant, us", ("", *QUANTILES), waits)
     if over_lcm.fault is not None:
         post_mortem = over_lcm.controller["post_mortem"]
         seq = post_mortem["seq"] if post_mortem else []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from quasilpv.cli.console import print_note, print_table
 from quasilpv.experiments.result import TrackResult
@@ -55,9 +55,13 @@ def print_results(results: Sequence[TrackResult]) -> None:
     """Print one table per scenario on stdout."""
     for scenario in dict.fromkeys(result.scenario for result in results):
         own = [result for result in results if result.scenario == scenario]
-        in_space = own[0].metrics.rms_z_m is not None
-        columns, row = (COLUMNS_IN_SPACE, cells_in_space) if in_space else (COLUMNS, cells)
+        columns, row = layout(own[0])
         print_table(f"{scenario}, {own[0].plant} plant", columns, [row(result, result.variant.label) for result in own])
+
+
+def layout(result: TrackResult) -> tuple[tuple[str, ...], Callable[[TrackResult, str], list[str]]]:
+    """Columns and rows of the table that a result stands in: a tool in space has a third axis."""
+    return (COLUMNS, cells) if result.metrics.rms_z_m is None else (COLUMNS_IN_SPACE, cells_in_space)
 
 
 def cells_in_space(result: TrackResult, label: str) -> list[str]:

@@ -49,9 +49,9 @@ def _plot_distance(axes: Axes, results: Sequence[TrackResult]) -> None:
 
 
 def _plot_bars(axes: Axes, results: Sequence[TrackResult]) -> None:
-    """Horizontal bars of the rms error (both axes together), annotated with the torque increment."""
+    """Horizontal bars of the rms distance, over all axes of the tool, annotated with the torque increment."""
     position = np.arange(len(results))[::-1]
-    rms_mm = np.array([1e3 * np.hypot(result.metrics.rms_x_m, result.metrics.rms_y_m) for result in results])
+    rms_mm = np.array([1e3 * result.metrics.rms_tool_m for result in results])
     hatches = ["" if dashes == "-" else "///" for dashes in _dashes(results)]
     colours = [_colour(result) for result in results]
     axes.barh(position, rms_mm, height=0.62, color=colours, hatch=hatches, edgecolor="white", linewidth=0.0, log=True)
