@@ -145,6 +145,7 @@ def _options_of(function: Callable[..., object]) -> dict[str, inspect.Parameter]
     """
     written = inspect.signature(function).parameters
     stated = {name: option for name, option in written.items() if option.annotation != "Question"}
+    # Trusted: these are annotations as they stand in this package's own verbs; nothing a user typed gets here.
     types = {name: eval(option.annotation, function.__globals__) for name, option in stated.items()}
     return {name: option.replace(annotation=types[name]) for name, option in stated.items()}
 

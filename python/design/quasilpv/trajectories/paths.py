@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, NamedTuple, Self
+from typing import Annotated, NamedTuple, Self, TypeVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -26,6 +26,9 @@ Point = tuple[float, float]
 Duration = Annotated[float, Field(gt=0)]
 
 MAX_DURATION_S = 600.0
+
+
+AnyPath = TypeVar("AnyPath", bound=StrictModel)
 
 
 class TaskMotion(NamedTuple):
@@ -239,7 +242,12 @@ def read_path(path: Path | str) -> TaskPath:
     Raises:
         InputError: the file cannot be read, is not strict JSON, or is not a path; the message names the field.
     """
+    return read_model(TaskPath, path)
+
+
+def read_model(kind: type[AnyPath], path: Path | str) -> AnyPath:
+    """A path of any kind from its file. Errors as `read_path`."""
     source = str(path)
     document = parse_strict_json(read_bytes(path), source)
     require_bounded(document, source)
-    return validate(TaskPath, document, source)
+    return validate(kind, document, source)

@@ -18,12 +18,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from quasilpv.arrays import FloatArray
-from quasilpv.documents.canonical import parse_strict_json, require_bounded
-from quasilpv.documents.strict_model import FieldError, StrictModel, validate
+from quasilpv.documents.strict_model import FieldError, StrictModel
 from quasilpv.errors import InputError
-from quasilpv.files import read_bytes
 from quasilpv.systems.robots.spatial import Placement
-from quasilpv.trajectories.paths import MAX_DURATION_S, Duration, septic
+from quasilpv.trajectories.paths import MAX_DURATION_S, Duration, read_model, septic
 
 Vector3 = tuple[float, float, float]
 
@@ -228,10 +226,7 @@ def read_spatial_path(path: Path | str) -> SpatialPath:
     Raises:
         InputError: the file cannot be read, is not strict JSON, or is not a path; the message names the field.
     """
-    source = str(path)
-    document = parse_strict_json(read_bytes(path), source)
-    require_bounded(document, source)
-    return validate(SpatialPath, document, source)
+    return read_model(SpatialPath, path)
 
 
 def _turned(vector: Vector3, share: float) -> FloatArray:
