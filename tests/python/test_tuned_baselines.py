@@ -205,6 +205,7 @@ def test_when_the_budget_is_counted_expect_that_of_the_default_design() -> None:
         assert tuned(controller).report["candidates_tried"] <= tuning_search.SEARCH_BUDGET
 
 
+@pytest.mark.full
 def test_when_a_law_contains_another_as_a_limit_expect_its_search_to_find_nothing_worse() -> None:
     without, with_observer = (tuned(name).report["disturbance_gain_s2"] for name in ("ctc-tuned", "ctc-dob-tuned"))
     assert with_observer <= 1.01 * without
@@ -235,7 +236,14 @@ def test_when_the_torque_may_not_move_expect_no_design_and_the_reason() -> None:
         tuned_baselines.pid_tuned(robot("arm2"), Specification(torque_activity=1e-6))
 
 
-@pytest.mark.parametrize(("controller", "kind"), list(zip(TUNED, ("pid", "ctc", "ctc-dob"), strict=True)))
+@pytest.mark.parametrize(
+    ("controller", "kind"),
+    [
+        ("pid-tuned", "pid"),
+        pytest.param("ctc-tuned", "ctc", marks=pytest.mark.full),
+        pytest.param("ctc-dob-tuned", "ctc-dob", marks=pytest.mark.full),
+    ],
+)
 def test_when_a_tuned_baseline_is_released_expect_the_law_kind_of_its_family_and_the_numbers_found(
     controller: str, kind: str
 ) -> None:
