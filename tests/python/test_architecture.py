@@ -211,6 +211,19 @@ def tracked_files(*patterns: str) -> list[Path]:
     return [path for line in sorted(set(listing.stdout.splitlines())) if (path := ROOT / line).is_file()]
 
 
+def test_fixtures_shared_by_test_modules_have_names_of_their_own() -> None:
+    # A plugin that one module loads serves every module of the process: of two fixtures of a name, one would be lost.
+    names = Counter(
+        node.name
+        for path in tracked_files("tests/python/*.py")
+        if not path.name.startswith("test_")
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef) and any("fixture" in ast.unparse(mark) for mark in node.decorator_list)
+    )
+    assert names.keys() >= {"experiment", "logged_experiment"}
+    assert [name for name, count in names.items() if count > 1] == []
+
+
 def included_headers(path: Path) -> list[str]:
     """Header names of the include directives of a C++ file."""
     return re.findall(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', path.read_text(encoding="utf-8"), flags=re.MULTILINE)

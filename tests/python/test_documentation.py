@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from markdown_it import MarkdownIt
@@ -20,6 +21,7 @@ from markdown_it.token import Token
 
 from quasilpv.cli.app import run
 from quasilpv.cli.verbs import VERBS
+from quasilpv.conditions.registry import CONDITIONS
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("[!_]*.md"), *(ROOT / "docs").glob("[!_]*/*.md")])
@@ -164,6 +166,7 @@ def test_every_line_of_a_console_block_is_run_or_listed_with_a_reason() -> None:
 @pytest.mark.parametrize(
     "name", [n for n, p in zip(NAMES, PAGES, strict=True) if any(f.language == "python" for f in fences(p))]
 )
+@patch.dict(CONDITIONS)  # what a page registers, other tests never see
 def test_the_python_of_a_page_runs_and_prints_what_the_page_says(name: str) -> None:
     namespace: dict[str, object] = {"__name__": "page"}
     printed: str | None = None

@@ -84,11 +84,11 @@ def test_when_a_run_is_tracked_into_another_folder_expect_it_to_be_the_last(
 
 
 def test_when_a_log_is_inspected_expect_counts_rates_and_the_hash(
-    tracked: tuple[TrackResult, Path], artifact: Artifact, capsys: pytest.CaptureFixture[str]
+    tracked: tuple[TrackResult, Path], logged_artifact: Artifact, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["log", "info", str(tracked[1]), "--json"]) == 0
     info = json.loads(capsys.readouterr().out)
-    assert info["artifact_hash"] == artifact.hash
+    assert info["artifact_hash"] == logged_artifact.hash
     assert (info["mode"], info["scenario"], info["telemetry_drops"]) == ("in-process", "hold", 0)
     telemetry = info["channels"]["QLPV_TELEMETRY"]
     assert (telemetry["messages"], telemetry["missing"], telemetry["refused"]) == (SAMPLES, 0, 0)
@@ -96,7 +96,7 @@ def test_when_a_log_is_inspected_expect_counts_rates_and_the_hash(
     said = [(0, "controller started"), (0, "plant started"), (299, "plant ended"), (299, "controller ended")]
     assert [(event["seq"], event["event"]) for event in info["events"]] == said
     assert run(["log", "info", str(tracked[1])]) == 0
-    assert artifact.hash in capsys.readouterr().out
+    assert logged_artifact.hash in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_when_figures_are_drawn_from_a_log_expect_those_of_the_run(
 
 
 def test_when_a_log_is_converted_expect_an_mcap_file_with_described_messages(
-    tracked: tuple[TrackResult, Path], artifact: Artifact, tmp_path: Path
+    tracked: tuple[TrackResult, Path], logged_artifact: Artifact, tmp_path: Path
 ) -> None:
     path = tmp_path / "run.mcap"
     assert run(["log", "to-mcap", str(tracked[1]), "-o", str(path)]) == 0
@@ -134,7 +134,7 @@ def test_when_a_log_is_converted_expect_an_mcap_file_with_described_messages(
         messages = [(schema, channel.topic, message) for schema, channel, message in reader.iter_messages()]
         attachments = {attachment.name: attachment.data for attachment in reader.iter_attachments()}
         (metadata,) = reader.iter_metadata()
-    assert metadata.metadata["artifact_hash"] == artifact.hash
+    assert metadata.metadata["artifact_hash"] == logged_artifact.hash
     assert attachments["artifact.json"] == log.documents["QLPV_ARTIFACT"]
     assert {schema.encoding for schema, _, _ in messages} == {"jsonschema"}
     trees = [json.loads(message.data) for _, topic, message in messages if topic == "/telemetry"]
@@ -142,7 +142,7 @@ def test_when_a_log_is_converted_expect_an_mcap_file_with_described_messages(
     assert [tree["applied_torque_nm"] for tree in trees] == log["telemetry"].records["applied_torque_nm"][
         :, :3
     ].tolist()
-    assert len(trees[0]["premise"]) == artifact.law.inertia.premises
+    assert len(trees[0]["premise"]) == logged_artifact.law.inertia.premises
     described = json.loads(next(schema.data for schema, topic, _ in messages if topic == "/telemetry"))["properties"]
     assert described.keys() == trees[0].keys()
     times = [message.log_time for _, topic, message in messages if topic == "/telemetry"]

@@ -196,22 +196,22 @@ def test_when_a_recording_was_cut_off_expect_a_warning_and_everything_that_is_wh
 
 
 def test_when_a_run_is_read_back_from_its_log_expect_every_sample_and_number(
-    tracked: tuple[TrackResult, Path], artifact: Artifact
+    tracked: tuple[TrackResult, Path], logged_artifact: Artifact
 ) -> None:
     result, path = tracked
     logged = logged_result(read_log(path))
     assert result.run.first_difference(logged.run) is None
     assert logged.row() == result.row()
     assert logged.title == result.title
-    assert read_log(path).artifact == artifact
+    assert read_log(path).artifact == logged_artifact
 
 
 def test_when_a_run_is_repeated_expect_the_same_log_byte_for_byte(
-    tracked: tuple[TrackResult, Path], artifact: Artifact, experiment: TrackingExperiment, tmp_path: Path
+    tracked: tuple[TrackResult, Path], logged_artifact: Artifact, logged_experiment: TrackingExperiment, tmp_path: Path
 ) -> None:
-    track(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()), tmp_path)
+    track(RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors()), tmp_path)
     assert (tmp_path / LOG_NAME).read_bytes() == tracked[1].read_bytes()
-    track(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors(), log=False), tmp_path / "unlogged")
+    track(RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors(), log=False), tmp_path / "unlogged")
     assert not (tmp_path / "unlogged" / LOG_NAME).exists()
 
 
@@ -324,14 +324,14 @@ def test_when_the_artifact_is_another_one_expect_exit_2_and_one_line(
 
 def test_when_two_processes_talk_expect_their_traffic_in_the_log_and_a_replay_bit_for_bit(
     tracked: tuple[TrackResult, Path],
-    artifact: Artifact,
-    experiment: TrackingExperiment,
+    logged_artifact: Artifact,
+    logged_experiment: TrackingExperiment,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("PATH", str(Path(executable("qlpv-simulator")).parent), prepend=":")
     executable("qlpv-controller")
-    run_over_lcm(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()), tmp_path, mode="lockstep")
+    run_over_lcm(RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors()), tmp_path, mode="lockstep")
     heard, made = read_log(tmp_path / LOG_NAME), read_log(tracked[1])
     for channel, own in COMPARED:
         theirs, ours = heard[channel].samples, made[channel].samples

@@ -25,12 +25,12 @@ SAMPLES = 300
 
 
 @pytest.fixture(scope="module")
-def artifact() -> Artifact:
+def logged_artifact() -> Artifact:
     return release(DesignRequest.of("arm3", "ctc-dob", Specification())).artifact
 
 
 @pytest.fixture(scope="module")
-def experiment() -> TrackingExperiment:
+def logged_experiment() -> TrackingExperiment:
     """A quick one: the arm holds a posture against the disturbance."""
     still = rest("hold", 3, SAMPLES * 1e-3)
     posture = tracking_experiment("serial-square").trajectory.evaluate(0.0).angle
@@ -41,11 +41,11 @@ def experiment() -> TrackingExperiment:
 
 @pytest.fixture(scope="module")
 def tracked(
-    artifact: Artifact, experiment: TrackingExperiment, tmp_path_factory: pytest.TempPathFactory
+    logged_artifact: Artifact, logged_experiment: TrackingExperiment, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[TrackResult, Path]:
     """A run in this process, and its log."""
     folder = tmp_path_factory.mktemp("log")
-    return track(RunSetup(experiment, artifact, plant="perturbed", sensors=Sensors()), folder), folder / LOG_NAME
+    return track(RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors()), folder), folder / LOG_NAME
 
 
 def edited(path: Path, target: Path, change: Any) -> Path:
