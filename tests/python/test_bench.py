@@ -24,7 +24,18 @@ from quasilpv.studies import Verdict
 
 ROOT = Path(__file__).parents[2]
 TOOLS = ROOT / "tools" / "bench"
-LAYERS = ("step", "plant", "lmi", "transport", "premises", "latency", "soak", "model", "certificate", "footprint")
+LAYERS = (
+    "step",
+    "plant",
+    pytest.param("lmi", marks=pytest.mark.full),
+    "transport",
+    "premises",
+    "latency",
+    "soak",
+    "model",
+    "certificate",
+    "footprint",
+)
 
 
 def run_tool(layer: str, *options: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -101,6 +112,7 @@ def test_the_soak_observed_something() -> None:
     assert "lost 0" not in done.stderr
 
 
+@pytest.mark.full
 def test_the_map_is_compared_with_both_ways_of_writing_it_in_cvxpy_with_and_without_the_exact_check() -> None:
     beside = {(row["name"].partition(": ")[2].partition(",")[0], row["against"]) for row in quick_rows("lmi")}
     for way in ("certified", "solver only"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -131,7 +132,7 @@ def test_when_an_option_of_a_verb_is_begun_expect_its_completions() -> None:
 
 
 def test_when_the_shell_asks_for_its_script_expect_one_that_calls_the_command() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "quasilpv", "--show-completion", "bash"], capture_output=True, text=True, check=True
-    )
+    # From a shell, as a user does: which one it is, is read off the parents of the process.
+    command = f"{shlex.quote(sys.executable)} -m quasilpv --show-completion bash; true"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True)
     assert "_DESIGN_COMPLETE=complete_bash" in done.stdout

@@ -235,6 +235,7 @@ def test_when_joints_are_disturbed_expect_the_tool_within_a_tenth_of_a_millimetr
     assert rms(released(2000.0), [(15.0, 50.0), (15.0, 5.0)], 0.25).max() < 1e-4
 
 
+@pytest.mark.full
 def test_when_the_disturbance_is_strong_expect_the_observer_to_make_the_error_five_times_smaller() -> None:
     strong = [(100.0, 50.0), (100.0, 50.0)]
     without, compensated = (rms(released(2000.0, compensated=on), strong, 0.25) for on in (False, True))

@@ -211,7 +211,10 @@ def test_when_a_run_is_repeated_expect_the_same_log_byte_for_byte(
 ) -> None:
     track(RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors()), tmp_path)
     assert (tmp_path / LOG_NAME).read_bytes() == tracked[1].read_bytes()
-    track(RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors(), log=False), tmp_path / "unlogged")
+    track(
+        RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors(), log=False),
+        tmp_path / "unlogged",
+    )
     assert not (tmp_path / "unlogged" / LOG_NAME).exists()
 
 
@@ -331,7 +334,9 @@ def test_when_two_processes_talk_expect_their_traffic_in_the_log_and_a_replay_bi
 ) -> None:
     monkeypatch.setenv("PATH", str(Path(executable("qlpv-simulator")).parent), prepend=":")
     executable("qlpv-controller")
-    run_over_lcm(RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors()), tmp_path, mode="lockstep")
+    run_over_lcm(
+        RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors()), tmp_path, mode="lockstep"
+    )
     heard, made = read_log(tmp_path / LOG_NAME), read_log(tracked[1])
     for channel, own in COMPARED:
         theirs, ours = heard[channel].samples, made[channel].samples

@@ -97,7 +97,7 @@ def test_when_the_page_is_followed_expect_the_law_designed_verified_tracked_and_
     design = (*python, "-c", "import sys; from quasilpv.cli.app import main; sys.exit(main())")
     where = say(*python, "-c", "import quasilpv._runtime as r; print(r.__file__)", cwd=work, **places)
     assert Path(where.strip()).is_relative_to(site)
-    [commands] = re.findall(r"```sh\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.S | re.M)
+    [commands] = re.findall(r"```sh\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
     lines = commands.splitlines()
     for line in lines[:-2]:
         say(*design, *shlex.split(line)[1:], cwd=work, **places)
@@ -106,4 +106,7 @@ def test_when_the_page_is_followed_expect_the_law_designed_verified_tracked_and_
     )
     schemas = sources / "tests/python/test_law_schemas.py"
     say(*python, "-m", "pytest", "-q", "-p", "no:cacheprovider", schemas, cwd=work, **places)
-    assert tracked and hil
+    [row] = tracked
+    assert row["controller"] == hil["controller"] == "slotine-li"
+    assert 0.0 < row["rms_x_m"] < 0.1  # of a square of 0.4 m, against 450 N m and a payload it does not know
+    assert hil["identical_to_in_process"] is True

@@ -194,6 +194,7 @@ def test_when_the_grid_is_evaluated_again_expect_the_reported_rates_and_other_ga
     assert not plants.loops(replace(design.law, feedback=5.0 * design.law.feedback)).is_stable(delay_s=delay)
 
 
+@pytest.mark.full
 def test_when_the_arm_tracks_the_default_scenarios_expect_the_required_accuracy(tmp_path: Path) -> None:
     artifact = to_artifact(tracking_design(robot("arm3"), Specification(rate_hz=RATE_HZ), designed()))
     for scenario in ("serial-square", "serial-circle"):

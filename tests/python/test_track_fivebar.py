@@ -27,7 +27,7 @@ def run(folder: Path, scenario: str, rate_hz: float, *, compensate: bool = True)
 
 
 @pytest.mark.parametrize("rate_hz", sorted(LARGEST_RMS_M))
-@pytest.mark.parametrize("scenario", ["fivebar-spiral", "fivebar-spiral-fast"])
+@pytest.mark.parametrize("scenario", ["fivebar-spiral", pytest.param("fivebar-spiral-fast", marks=pytest.mark.full)])
 def test_when_the_default_design_draws_the_spiral_expect_the_required_accuracy(
     scenario: str, rate_hz: float, tmp_path: Path
 ) -> None:

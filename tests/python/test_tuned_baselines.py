@@ -26,6 +26,8 @@ from quasilpv.systems.robots.registry import robot
 from reference.step import ComputedTorque, OutputStage, Pid, Sample, SpeedFilter
 
 TUNED = ("pid-tuned", "ctc-tuned", "ctc-dob-tuned")
+ONE_SEARCH = [pytest.param(name, marks=() if name == "ctc-tuned" else pytest.mark.full) for name in TUNED]
+"""A search takes seconds, and is the same for all: the quick tier makes one."""
 T = 1e-3
 FILTER_S = 2e-3
 DESIGN_INERTIA = np.array([[3.0, 0.7], [0.7, 1.5]])
@@ -172,7 +174,7 @@ def tuning_of(design: TrackingDesign) -> baselines.Tuning:
     return baselines.Tuning(**{name: design.report[name] for name in names})
 
 
-@pytest.mark.parametrize("controller", TUNED)
+@pytest.mark.parametrize("controller", ONE_SEARCH)
 def test_when_a_baseline_is_tuned_expect_what_was_asked_for_at_configurations_it_has_not_seen(controller: str) -> None:
     design = tuned(controller)
     rate, gain, activity = performance(controller, tuning_of(design))
@@ -197,6 +199,7 @@ def test_when_the_gains_of_the_thesis_meet_the_same_bounds_expect_only_computed_
         assert tuned(controller).report["disturbance_gain_s2"] < gain
 
 
+@pytest.mark.full
 def test_when_the_budget_is_counted_expect_that_of_the_default_design() -> None:
     default = design_acceleration_law(robot("arm3"), Specification())
     assert tuning_search.SCALES_PER_CANDIDATE * default.candidates_tried == tuning_search.SEARCH_BUDGET
@@ -211,7 +214,7 @@ def test_when_a_law_contains_another_as_a_limit_expect_its_search_to_find_nothin
     assert with_observer <= 1.01 * without
 
 
-@pytest.mark.parametrize("controller", TUNED)
+@pytest.mark.parametrize("controller", ONE_SEARCH)
 def test_when_single_numbers_of_a_tuned_baseline_move_expect_no_better_admissible_one(controller: str) -> None:
     """A constrained optimum: every step of 5 % that lowers the objective by as much breaks a constraint."""
     chosen, plants = tuned(controller), PlantGrid.screen(robot("arm3"))
@@ -239,7 +242,7 @@ def test_when_the_torque_may_not_move_expect_no_design_and_the_reason() -> None:
 @pytest.mark.parametrize(
     ("controller", "kind"),
     [
-        ("pid-tuned", "pid"),
+        pytest.param("pid-tuned", "pid", marks=pytest.mark.full),
         pytest.param("ctc-tuned", "ctc", marks=pytest.mark.full),
         pytest.param("ctc-dob-tuned", "ctc-dob", marks=pytest.mark.full),
     ],

@@ -45,7 +45,9 @@ def tracked(
 ) -> tuple[TrackResult, Path]:
     """A run in this process, and its log."""
     folder = tmp_path_factory.mktemp("log")
-    return track(RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors()), folder), folder / LOG_NAME
+    return track(
+        RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors()), folder
+    ), folder / LOG_NAME
 
 
 def edited(path: Path, target: Path, change: Any) -> Path:
