@@ -168,7 +168,7 @@ def main(folder: Path = Path("out/four-link-arm")) -> None:
         print(f"{artifact.name}, {name} compensation: rms {rms_um[0]:.3g} um in X, {rms_um[1]:.3g} um in Y")
         results.append(result)
     write_gallery(results[1], folder)
-    write_animation(results, source.with_payload_fraction(1.0), folder / "animation.gif")
+    write_animation(results, folder / "animation.gif")
 
 
 if __name__ == "__main__":

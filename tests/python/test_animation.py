@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from numpy.testing import assert_allclose
 from PIL import Image
@@ -13,19 +14,20 @@ from PIL import Image
 from quasilpv.arrays import FloatArray
 from quasilpv.cli import run
 from quasilpv.errors import InputError
-from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.figures.animation import FRAMES_PER_SECOND, LAST_FRAME_S, Film, write_animation
 from quasilpv.systems.robots.mechanism import PlanarMechanism
-from quasilpv.systems.robots.registry import robot
+from quasilpv.systems.robots.registry import any_robot, robot
+from quasilpv.systems.robots.tree_mechanism import TreeMechanism
+from reference.random_trees import pinocchio_tree
 from reference.readable import assert_readable
-from reference.runs import synthetic_result
+from reference.runs import result_of_motion, synthetic_run
 
 ROBOTS = ("arm2", "arm2-upright", "arm3", "fivebar")
 POSTURE = {"fivebar": np.array([-0.8, 0.7])}
 
 
-def motion(mechanism: PlanarMechanism, name: str) -> FloatArray:
+def motion(mechanism: PlanarMechanism | TreeMechanism, name: str) -> FloatArray:
     """Angles (samples, n) about a regular posture of a robot."""
     centre = POSTURE.get(name, np.full(mechanism.joints, 0.4))
     return centre + 0.2 * np.sin(np.linspace(0.0, 2.0, 1000))[:, None]
@@ -33,24 +35,13 @@ def motion(mechanism: PlanarMechanism, name: str) -> FloatArray:
 
 def pair_of_results(name: str, error_rad: float = 1e-4) -> list[TrackResult]:
     """Two runs of a second, the second one with a hundredth of the error of the first."""
-    mechanism = robot(name).model
+    mechanism = any_robot(name).model
     reference = motion(mechanism, name)
 
-    def tool(angle: FloatArray) -> FloatArray:
-        return np.array([mechanism.forward_kinematics(row)[:2] for row in angle])
-
     def result(compensated: bool, error: float) -> TrackResult:
-        plain = synthetic_result(Variant("dob-acceleration", compensated=compensated), mechanism.joints, 1000)
-        record = replace(
-            plain.run, reference_angle_rad=reference, true_angle_rad=reference + error * np.sin(30 * reference)
-        )
-        return replace(
-            plain,
-            run=record,
-            metrics=compute_metrics(record, tool(record.true_angle_rad) - tool(reference)),
-            tool_position_m=tool(record.true_angle_rad),
-            reference_position_m=tool(reference),
-        )
+        true = reference + error * np.sin(30 * reference)
+        record = replace(synthetic_run(1000, mechanism.joints), reference_angle_rad=reference, true_angle_rad=true)
+        return result_of_motion(mechanism, record, Variant("dob-acceleration", compensated=compensated))
 
     return [result(False, error_rad), result(True, 0.01 * error_rad)]
 
@@ -68,9 +59,21 @@ def test_when_a_robot_is_drawn_expect_links_of_its_lengths_that_end_at_the_tool(
         assert_allclose(tool, plant.forward_kinematics(theta)[:2], atol=1e-14)
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+def test_when_a_robot_in_space_is_drawn_expect_its_joints_where_pinocchio_has_them() -> None:
+    mechanism = any_robot("ur5").model
+    model = pinocchio_tree(mechanism.tree)
+    data = model.createData()
+    for theta in motion(mechanism, "ur5")[::200]:
+        points = mechanism.skeleton(theta)
+        pin.forwardKinematics(model, data, theta)
+        assert_allclose(points[0], 0.0, atol=1e-15)
+        assert_allclose(points[1:-1], [data.oMi[k].translation for k in range(1, 7)], atol=1e-12)
+        assert_allclose(mechanism.tool_path(theta[None]), points[-1:], atol=1e-15)
+
+
+@pytest.mark.parametrize("name", [*ROBOTS, "ur5"])
 def test_when_an_animation_is_drawn_expect_no_text_cut_or_over_another(name: str) -> None:
-    film = Film(pair_of_results(name), robot(name).model)
+    film = Film(pair_of_results(name))
     film.draw(0.5)
     assert_readable(film.figure)
 
@@ -78,7 +81,7 @@ def test_when_an_animation_is_drawn_expect_no_text_cut_or_over_another(name: str
 def test_when_an_animation_is_written_expect_real_time_and_motion_in_every_panel(tmp_path: Path) -> None:
     drawn: list[tuple[int, int]] = []
     path = tmp_path / "new" / "arm.gif"
-    frames = write_animation(pair_of_results("arm3"), robot("arm3").model, path, lambda *step: drawn.append(step))
+    frames = write_animation(pair_of_results("arm3"), path, lambda *step: drawn.append(step))
     with Image.open(path) as image:
         assert image.n_frames == frames == len(drawn) == drawn[-1][1]
         assert image.info["loop"] == 0
@@ -96,8 +99,9 @@ def test_when_an_animation_is_written_expect_real_time_and_motion_in_every_panel
     assert all(panel.max() > 50 for panel in np.array_split(upper[height // 8 :], 4, axis=1)), width
 
 
-def test_when_a_run_has_no_error_expect_the_moving_arm_drawn() -> None:
-    film = Film(pair_of_results("arm3", error_rad=0.0), robot("arm3").model)
+@pytest.mark.parametrize("name", ["arm3", "ur5"])
+def test_when_a_run_has_no_error_expect_the_moving_arm_drawn(name: str) -> None:
+    film = Film(pair_of_results(name, error_rad=0.0))
     early, late = (np.asarray(film.draw(time_s).convert("L"), dtype=float) for time_s in (0.2, 0.4))
     height = len(early)
     assert np.abs(late - early)[height // 8 : 2 * height // 3].max() > 50  # below the title, which tells the time
@@ -106,7 +110,7 @@ def test_when_a_run_has_no_error_expect_the_moving_arm_drawn() -> None:
 def test_when_an_animation_cannot_be_written_expect_an_input_error(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="file"):
-        write_animation(pair_of_results("arm2"), robot("arm2").model, tmp_path / "file" / "arm.gif")
+        write_animation(pair_of_results("arm2"), tmp_path / "file" / "arm.gif")
 
 
 @pytest.mark.full

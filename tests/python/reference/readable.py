@@ -6,6 +6,9 @@ from itertools import combinations
 
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+from mpl_toolkits.mplot3d import Axes3D, proj3d
+from mpl_toolkits.mplot3d.art3d import Text3D
 
 from quasilpv.figures.style import style
 
@@ -14,7 +17,8 @@ def hidden_tick_labels(figure: Figure) -> set[Text]:
     """Labels of ticks outside the view, which matplotlib keeps but does not draw."""
     hidden = set()
     for axes in figure.axes:
-        for axis, (low, high) in ((axes.xaxis, sorted(axes.get_xlim())), (axes.yaxis, sorted(axes.get_ylim()))):
+        for axis in (axes.xaxis, axes.yaxis, *([axes.zaxis] if isinstance(axes, Axes3D) else [])):
+            low, high = sorted(axis.get_view_interval())
             for minor in (False, True):
                 for location, label in zip(axis.get_ticklocs(minor=minor), axis.get_ticklabels(minor), strict=False):
                     if not low <= location <= high:
@@ -22,15 +26,28 @@ def hidden_tick_labels(figure: Figure) -> set[Text]:
     return hidden
 
 
+def drawn_box(text: Text) -> Bbox:
+    """Where a text is drawn: one in space is put there when it is drawn, and knows nothing of it afterwards."""
+    if not isinstance(text, Text3D):
+        return text.get_window_extent()
+    x, y, _ = proj3d.proj_transform(*text.get_position_3d(), text.axes.get_proj())
+    flat = text.get_position()
+    text.set_position((x, y))
+    box = text.get_window_extent()
+    text.set_position(flat)
+    return box
+
+
 def texts_with_boxes(figure: Figure) -> list[tuple[str, tuple[float, float, float, float]]]:
     with style():
         figure.canvas.draw()
         hidden = hidden_tick_labels(figure)
+        figure.canvas.draw()  # in space the question has moved the labels
         boxes = []
         for text in figure.findobj(Text):
             assert isinstance(text, Text)
             if text not in hidden and text.get_visible() and text.get_text().strip():
-                box = text.get_window_extent()
+                box = drawn_box(text)
                 boxes.append((text.get_text(), (box.x0, box.y0, box.x1, box.y1)))
     return boxes
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from quasilpv.arrays import FloatArray
 from quasilpv.experiments.metrics import compute_metrics
 from quasilpv.experiments.result import Disturbance, TrackResult, Variant
 from quasilpv.experiments.run import Run
+from quasilpv.systems.robots.arm_parameters import Link
+from quasilpv.systems.robots.arms import PlanarSerialArm
+from quasilpv.systems.robots.mechanism import PlanarMechanism
+from quasilpv.systems.robots.tree_mechanism import TreeMechanism
 
 
 def synthetic_run(samples: int, joints: int) -> Run:
@@ -41,6 +47,20 @@ def tool_position(angle: FloatArray) -> FloatArray:
     return np.stack([1.5 + 0.2 * np.cos(angle[:, 0]), -1.5 + 0.2 * np.sin(angle[:, 0])], axis=1)
 
 
+def synthetic_robot(joints: int) -> PlanarSerialArm:
+    """An arm of equal links."""
+    link = Link(length_m=0.5, mass_kg=2.0, com_m=0.25, inertia_kg_m2=0.2)
+    return PlanarSerialArm("synthetic", (link,) * joints)
+
+
+def result_of_motion(robot: PlanarMechanism | TreeMechanism, run: Run, variant: Variant) -> TrackResult:
+    """What a robot shows that makes the motions of a record."""
+    plain = synthetic_result(variant, run.joints, run.time_s.size)
+    tool, reference = robot.tool_path(run.true_angle_rad), robot.tool_path(run.reference_angle_rad)
+    metrics = compute_metrics(run, tool - reference)
+    return replace(plain, run=run, robot=robot, metrics=metrics, tool_position_m=tool, reference_position_m=reference)
+
+
 def synthetic_result(variant: Variant, joints: int = 3, samples: int = 2000) -> TrackResult:
     """A result with every figure's data."""
     run = synthetic_run(samples, joints)
@@ -53,6 +73,8 @@ def synthetic_result(variant: Variant, joints: int = 3, samples: int = 2000) -> 
         metrics=compute_metrics(run, tool_position(run.true_angle_rad) - tool_position(run.reference_angle_rad)),
         worst_growth_rate_per_s=None,
         run=run,
+        robot=synthetic_robot(joints),
+        torque_limit_nm=np.linspace(400.0, 350.0, joints),
         tool_position_m=tool_position(run.true_angle_rad),
         reference_position_m=tool_position(run.reference_angle_rad),
         true_disturbance=Disturbance(run.filtered_disturbance + 0.5, "rad/s²", "acceleration"),

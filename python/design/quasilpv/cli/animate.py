@@ -10,7 +10,6 @@ import typer
 from quasilpv.cli.console import JsonOption, Steps, print_json, print_note, progress
 from quasilpv.cli.options import EncoderOption, FormatOption, LogOption, PlantOption, RateOption, formats_of, plant_kind
 from quasilpv.defaults import ENCODER_BITS
-from quasilpv.errors import InputError
 from quasilpv.synthesis import DEFAULT_CONTROLLER
 
 if TYPE_CHECKING:
@@ -59,10 +58,6 @@ def animate_command(
 
     formats = formats_of(figure_formats)
     experiments = [tracking_experiment(name) for name in dict.fromkeys(scenarios or DEFAULT_SCENARIOS)]
-    for experiment in experiments:
-        if experiment.robot.in_space:
-            expected = "a robot that moves in a plane, the plane that animations show"
-            raise InputError("command line", "SCENARIO", experiment.name, expected)
     bits = ENCODER_BITS if encoder_bits is None else encoder_bits
     variants = [Variant(DEFAULT_CONTROLLER, bits, compensated) for compensated in (False, True)]
     session = Session(None, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
@@ -90,12 +85,9 @@ def animate_command(
 def _animate(session: Session, experiment: TrackingExperiment, pair: list[TrackResult], steps: Steps) -> dict[str, Any]:
     """Write the animation of a scenario; its entry of ``--json``."""
     from quasilpv.figures.animation import write_animation
-    from quasilpv.systems.robots.mechanism import PlanarMechanism
 
     steps.begin(f"{experiment.name}: animation")
     path = session.out / experiment.name / FILE_NAME
-    robot = experiment.robot.with_payload_fraction(1.0 if session.plant == "perturbed" else 0.0)
-    assert isinstance(robot, PlanarMechanism)
-    frames = write_animation(pair, robot, path, steps.parts)
+    frames = write_animation(pair, path, steps.parts)
     steps.end()
     return {"animation": str(path), "frames": frames, "runs": [result.row() for result in pair]}

@@ -17,8 +17,7 @@ from quasilpv.errors import InputError, TransportError
 
 if TYPE_CHECKING:
     from quasilpv.artifact import Artifact
-    from quasilpv.systems.robots.mechanism import PlanarMechanism
-    from quasilpv.systems.robots.tree_mechanism import TreeMechanism
+    from quasilpv.systems.robots.drawing import Drawing
     from quasilpv.view.live import LiveMotion
     from quasilpv.view.page import Page
     from quasilpv.view.playback import Motion
@@ -78,7 +77,7 @@ def view_command(
     else:
         recorded = open_log(log or LAST, artifact)
         controller, motion = recorded.artifact, Motion.of_log(recorded)
-        mechanism = _in_a_plane(mechanism_of(recorded.scenario.plant), controller.name)
+        mechanism = mechanism_of(recorded.scenario.plant)
         title = f"{recorded.scenario.name}, {recorded.header.controller}"
     page = Page(Playback(title, motion, mechanism, _disturbance_unit(controller)), port, listener)
     if at is not None:
@@ -116,23 +115,12 @@ def _first_samples(listener: LiveMotion, url: str, timeout_s: float) -> Motion:
     return motion
 
 
-def _in_a_plane(mechanism: PlanarMechanism | TreeMechanism, source: str) -> PlanarMechanism:
-    from quasilpv.systems.robots.mechanism import PlanarMechanism
-
-    if not isinstance(mechanism, PlanarMechanism):
-        raise InputError(
-            source, "robot", f"{mechanism.joints} joints in space", "a robot in a plane, which the view shows"
-        )
-    return mechanism
-
-
-def _mechanism(controller: Artifact, scenario: Path | None) -> PlanarMechanism:
+def _mechanism(controller: Artifact, scenario: Path | None) -> Drawing:
     from quasilpv.experiments.logged import mechanism_of
     from quasilpv.scenarios import read_scenario
     from quasilpv.systems.robots.registry import any_robot
 
-    known = any_robot(controller.robot.id).model if scenario is None else mechanism_of(read_scenario(scenario).plant)
-    return _in_a_plane(known, controller.name)
+    return any_robot(controller.robot.id).model if scenario is None else mechanism_of(read_scenario(scenario).plant)
 
 
 def _disturbance_unit(controller: Artifact) -> str:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from quasilpv.arrays import FloatArray
 from quasilpv.artifact.envelope import OperatingEnvelope
 from quasilpv.defaults import ENCODER_BITS
 from quasilpv.experiments.metrics import Metrics
 from quasilpv.experiments.run import Run
+from quasilpv.systems.robots.drawing import Drawing
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +74,10 @@ class TrackResult:
         worst_growth_rate_per_s: worst growth rate of the sampled closed loop with half a sample of delay; ``None`` if
             the design has no such result (baselines).
         run: the record.
-        tool_position_m: (N, 2) true position of the tool.
-        reference_position_m: (N, 2) where it should have been.
+        robot: what moved, as pictures show it.
+        torque_limit_nm: (n,) what its drives deliver.
+        tool_position_m: (N, 2) true position of the tool; (N, 3) in space.
+        reference_position_m: likewise, where it should have been.
         true_disturbance: ``None`` for laws that estimate none.
         envelope: what the artifact says of its operating envelope; ``None`` if it says nothing.
     """
@@ -85,6 +90,8 @@ class TrackResult:
     metrics: Metrics
     worst_growth_rate_per_s: float | None
     run: Run
+    robot: Drawing
+    torque_limit_nm: FloatArray
     tool_position_m: FloatArray
     reference_position_m: FloatArray
     true_disturbance: Disturbance | None
@@ -93,6 +100,16 @@ class TrackResult:
     def __repr__(self) -> str:
         """What ran, in a line, and its numbers in another."""
         return f"TrackResult({self.title}, {self.plant} plant, {self.rate_hz:g} Hz\n  {self.metrics})"
+
+    @property
+    def in_space(self) -> bool:
+        """Whether the tool leaves a plane."""
+        return bool(self.reference_position_m.shape[1] > 2)
+
+    @property
+    def distance_m(self) -> FloatArray:
+        """(N,) of the tool from where it should have been."""
+        return np.asarray(np.linalg.norm(self.tool_position_m - self.reference_position_m, axis=1))
 
     @property
     def title(self) -> str:

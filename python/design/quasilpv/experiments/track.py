@@ -27,9 +27,8 @@ from quasilpv.scenarios import (
     read_scenario,
     write_scenario,
 )
-from quasilpv.systems.robots.mechanism import PlanarMechanism
+from quasilpv.systems.robots.drawing import Drawing
 from quasilpv.systems.robots.registry import AnyRobot, all_robots
-from quasilpv.systems.robots.tree_mechanism import TreeMechanism
 from quasilpv.telemetry import LOG_NAME, Mode, RunHeader
 from quasilpv.telemetry.recording import RunDocuments, write_run
 from quasilpv.trajectories import write_trajectory
@@ -225,7 +224,7 @@ def summarise(run: Run, setup: RunSetup) -> TrackResult:
 def summarise_as(
     run: Run,
     name: str,
-    mechanism: PlanarMechanism | TreeMechanism,
+    mechanism: Drawing,
     artifact: Artifact,
     *,
     plant: str,
@@ -240,12 +239,7 @@ def summarise_as(
         mechanism: what moves the tool; its masses do not matter.
         artifact, plant, sensors, variant: as of `RunSetup`; the plant by its label.
     """
-
-    def tool_position(angle: FloatArray) -> FloatArray:
-        coordinates = 3 if isinstance(mechanism, TreeMechanism) else 2
-        return np.array([mechanism.forward_kinematics(row)[:coordinates] for row in angle])
-
-    actual, wanted = tool_position(run.true_angle_rad), tool_position(run.reference_angle_rad)
+    actual, wanted = mechanism.tool_path(run.true_angle_rad), mechanism.tool_path(run.reference_angle_rad)
     runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()), artifact.name)
     return TrackResult(
         scenario=name,
@@ -256,6 +250,8 @@ def summarise_as(
         metrics=compute_metrics(run, actual - wanted, has_premises=bool(artifact.programs)),
         worst_growth_rate_per_s=worst_growth_rate(artifact),
         run=run,
+        robot=mechanism,
+        torque_limit_nm=np.array(artifact.limits.torque_nm),
         tool_position_m=actual,
         reference_position_m=wanted,
         true_disturbance=true_disturbance(run, artifact, runtime),

@@ -11,20 +11,23 @@ import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 from matplotlib.ticker import LogLocator
 from PIL import Image
 
 from quasilpv.arrays import FloatArray
 from quasilpv.experiments.result import TrackResult
+from quasilpv.figures.space import Viewpoint, draw_shadow, draw_skeleton, on_floor, space_axes
 from quasilpv.figures.style import BLACK, BLUE, REFERENCE_COLOUR, VERMILION, WIDTH_IN, length_unit, style
+from quasilpv.figures.tracking import AXES, plane_of
 from quasilpv.files import write_atomically
 from quasilpv.progress import Progress, no_progress
-from quasilpv.systems.robots.mechanism import PlanarMechanism
 
 FRAMES_PER_SECOND = 20
 PIXELS_PER_INCH = 100
@@ -34,14 +37,12 @@ TRAIL_S = 0.3
 COLOURS_IN_FILE = 96
 
 RUN_COLOURS = (VERMILION, BLUE)
-LINK_COLOUR = "#4d5a66"
 LOWEST_DISTANCE_UM = 1.0
 SMALLEST_RING_M = 1e-9
 
 
 def write_animation(
     results: Sequence[TrackResult],
-    robot: PlanarMechanism,
     path: Path,
     progress: Progress = no_progress,
 ) -> int:
@@ -49,7 +50,6 @@ def write_animation(
 
     Args:
         results: two, of one scenario.
-        robot: the plant whose links are drawn.
         path: of the file; missing folders are made.
         progress: called with (frames drawn, frames in all).
 
@@ -60,7 +60,7 @@ def write_animation(
         InputError: the file cannot be written.
     """
     with style():
-        film = Film(results, robot)
+        film = Film(results)
         images = []
         for frame, time_s in enumerate(film.times_s):
             images.append(film.draw(float(time_s)))
@@ -83,10 +83,10 @@ class Film:
         times_s: of the frames.
 
     Args:
-        results, robot: as `write_animation`.
+        results: as `write_animation`.
     """
 
-    def __init__(self, results: Sequence[TrackResult], robot: PlanarMechanism) -> None:
+    def __init__(self, results: Sequence[TrackResult]) -> None:
         """Draw what does not move."""
         duration_s = float(results[0].run.time_s[-1])
         self.times_s = np.append(np.arange(0.0, duration_s, 1.0 / FRAMES_PER_SECOND), duration_s)
@@ -104,15 +104,16 @@ class Film:
         distances.set_xlim(0.0, duration_s)
         distances.set_xlabel("time (s)")
         distances.set_ylabel("tool error (µm)")
+        postures = [skeleton_at(result, time_s) for result in results for time_s in self.times_s]
+        corners = np.concatenate(postures)
         self._views = []
         for i, (result, colour) in enumerate(zip(results, RUN_COLOURS, strict=True)):
-            panels = [self.figure.add_subplot(grid[0, 2 * i + column]) for column in (0, 1)]
-            self._views.append(_View(result, robot, colour, (panels[0], panels[1], distances)))
-        corners = np.concatenate([view.skeleton(time_s) for view in self._views for time_s in self.times_s])
-        for view in self._views:
-            _fit(view.robot_axes, corners)
-        for view in self._views[1:]:
-            view.robot_axes.tick_params(labelleft=False)
+            panel = _space_panel if result.in_space else _plane_panel
+            robot = panel(self.figure, grid[0, 2 * i], corners, result)
+            glass = self.figure.add_subplot(grid[0, 2 * i + 1])
+            if i:
+                robot.tick_params(labelleft=False)
+            self._views.append(_View(result, colour, (robot, glass, distances)))
         largest_um = max(float(view.distance_um.max()) for view in self._views)
         distances.set_ylim(LOWEST_DISTANCE_UM, 2.0 * max(largest_um, LOWEST_DISTANCE_UM))
 
@@ -129,33 +130,32 @@ class Film:
 class _View:
     """One run: robot, magnified tool, and its curve of the distance."""
 
-    def __init__(self, result: TrackResult, robot: PlanarMechanism, colour: str, axes: tuple[Axes, Axes, Axes]) -> None:
-        self._run, self._robot = result.run, robot
-        self._tool = result.tool_position_m
-        self._error = result.tool_position_m - result.reference_position_m
-        self.distance_um = 1e6 * np.hypot(*self._error.T)
-        self.robot_axes, glass, distances = axes
-        self._draw_robot(result, colour)
-        self._draw_glass(glass, colour, math.hypot(result.metrics.rms_x_m, result.metrics.rms_y_m))
+    def __init__(self, result: TrackResult, colour: str, axes: tuple[Axes, Axes, Axes]) -> None:
+        self._result, self._run = result, result.run
+        self._plane = plane_of(result.reference_position_m)
+        self._error = (result.tool_position_m - result.reference_position_m)[:, self._plane]
+        self.distance_um = 1e6 * result.distance_m
+        robot, glass, distances = axes
+        self._draw_robot(robot, result, colour)
+        self._draw_glass(glass, colour, result)
         (self._curve,) = distances.plot([], [], color=colour, linewidth=0.9)
 
-    def _draw_robot(self, result: TrackResult, colour: str) -> None:
-        axes = self.robot_axes
+    def _draw_robot(self, axes: Axes, result: TrackResult, colour: str) -> None:
         with_or_without = "with" if result.variant.compensated else "without"
         axes.set_title(f"{with_or_without} disturbance compensation", color=colour)
         axes.plot(*result.reference_position_m.T, color=REFERENCE_COLOUR, linewidth=2.4, solid_capstyle="round")
-        (self._links,) = axes.plot(
-            [], [], color=LINK_COLOUR, linewidth=4.0, marker="o", markersize=5.0, markerfacecolor="white"
-        )
-        (self._trace,) = axes.plot([], [], color=colour, linewidth=1.2)
-        axes.set_xlabel("X, Y (m)")
+        start = skeleton_at(result, 0.0)
+        self._shadow = draw_shadow(axes, start) if result.in_space else None
+        self._links = draw_skeleton(axes, start)
+        (self._trace,) = axes.plot(*result.tool_position_m[:1].T, color=colour, linewidth=1.2)
 
-    def _draw_glass(self, axes: Axes, colour: str, rms_m: float) -> None:
-        largest_m = float(np.hypot(*self._error.T).max())
+    def _draw_glass(self, axes: Axes, colour: str, result: TrackResult) -> None:
+        largest_m, rms_m = result.metrics.max_tool_m, result.metrics.rms_tool_m
         unit = length_unit(largest_m)
         ring = _round_number(max(largest_m, SMALLEST_RING_M) * unit.factor)
         self._to_glass = unit.factor / ring
-        caption = f"magnified:\nring {ring:g} {unit.name}\nrms {rms_m * unit.factor:.3g} {unit.name}"
+        plane = f" {AXES[self._plane[0]]}, {AXES[self._plane[1]]}" if result.in_space else ""
+        caption = f"magnified{plane}:\nring {ring:g} {unit.name}\nrms {rms_m * unit.factor:.3g} {unit.name}"
         axes.text(0.0, -1.2, caption, ha="center", va="top", fontsize=8.0)
         angle = np.linspace(0.0, 2.0 * math.pi, 90)
         axes.plot(np.cos(angle), np.sin(angle), color=BLACK, linewidth=0.8)
@@ -169,30 +169,55 @@ class _View:
         axes.set_yticks([])
         axes.set_axis_off()
 
-    def _sample(self, time_s: float) -> int:
-        return min(round(time_s / self._run.sample_period_s), self._run.time_s.size - 1)
-
-    def skeleton(self, time_s: float) -> FloatArray:
-        """Ends of the links at a time, points x 2, m."""
-        return self._robot.skeleton(self._run.true_angle_rad[self._sample(time_s)])
-
     def show(self, time_s: float) -> None:
         """Move everything to a time."""
-        now, past = self._sample(time_s), self._sample(max(time_s - TRAIL_S, 0.0))
-        self._links.set_data(*self.skeleton(time_s).T)
-        self._trace.set_data(*self._tool[: now + 1].T)
+        now, past = sample_at(self._result, time_s), sample_at(self._result, max(time_s - TRAIL_S, 0.0))
+        skeleton = skeleton_at(self._result, time_s)
+        _move(self._links, skeleton)
+        if self._shadow is not None:
+            _move(self._shadow, on_floor(skeleton))
+        _move(self._trace, self._result.tool_position_m[: now + 1])
         self._trail.set_data(*(self._to_glass * self._error[past : now + 1]).T)
         self._dot.set_data(*(self._to_glass * self._error[now : now + 1]).T)
         self._curve.set_data(self._run.time_s[: now + 1], self.distance_um[: now + 1])
 
 
-def _fit(axes: Axes, points: FloatArray) -> None:
+def sample_at(result: TrackResult, time_s: float) -> int:
+    """The sample of a run that is next to a time."""
+    return min(round(time_s / result.run.sample_period_s), result.run.time_s.size - 1)
+
+
+def skeleton_at(result: TrackResult, time_s: float) -> FloatArray:
+    """Ends of the links at a time, points x 2 or points x 3, m."""
+    return result.robot.skeleton(result.run.true_angle_rad[sample_at(result, time_s)])
+
+
+def _plane_panel(figure: Figure, place: SubplotSpec, points: FloatArray, result: TrackResult) -> Axes:
     """Equal scales, and room for all points."""
+    del result
+    axes = figure.add_subplot(place)
     low, high = points.min(axis=0), points.max(axis=0)
     room = 0.08 * float((high - low).max())
     axes.set_aspect("equal")
     axes.set_xlim(low[0] - room, high[0] + room)
     axes.set_ylim(low[1] - room, high[1] + room)
+    axes.set_xlabel("X, Y (m)")
+    return axes
+
+
+def _space_panel(figure: Figure, place: SubplotSpec, points: FloatArray, result: TrackResult) -> Any:
+    """The same in space, seen from before the path; no numbers, for which there is no room."""
+    axes: Any = space_axes(figure, place, points, Viewpoint.of_path(result.reference_position_m), zoom=1.4)
+    for axis, name in ((axes.xaxis, "X"), (axes.yaxis, "Y"), (axes.zaxis, "Z")):
+        axis.set_ticklabels([])
+        axis.set_label_text(name)
+        axis.labelpad = -14.0
+    return axes
+
+
+def _move(line: Any, points: FloatArray) -> None:
+    """Give a line other points, in a plane or in space."""
+    (line.set_data if points.shape[1] == 2 else line.set_data_3d)(*points.T)
 
 
 def _round_number(value: float) -> float:

@@ -33,7 +33,7 @@ def comparison_figure(results: Sequence[TrackResult]) -> Figure:
 
 def _plot_distance(axes: Axes, results: Sequence[TrackResult]) -> None:
     for result, dashes in zip(results, _dashes(results), strict=True):
-        distance_mm = 1e3 * np.linalg.norm(result.tool_position_m - result.reference_position_m, axis=1)
+        distance_mm = 1e3 * result.distance_m
         axes.semilogy(
             result.run.time_s,
             np.maximum(distance_mm, _FLOOR_MM),

@@ -11,6 +11,7 @@ from quasilpv.defaults import DEFAULT_FORMATS
 from quasilpv.experiments.result import TrackResult
 from quasilpv.figures.comparison import comparison_figure
 from quasilpv.figures.envelope import envelope_figure
+from quasilpv.figures.robot import robot_figure
 from quasilpv.figures.style import save
 from quasilpv.figures.tracking import (
     disturbance_figure,
@@ -21,6 +22,7 @@ from quasilpv.figures.tracking import (
 )
 
 FIGURES: Mapping[str, Callable[[TrackResult], Figure]] = {
+    "robot": robot_figure,
     "path": path_figure,
     "errors": error_figure,
     "torques": torque_figure,
@@ -32,13 +34,17 @@ FIGURES: Mapping[str, Callable[[TrackResult], Figure]] = {
 
 
 def figures_of(result: TrackResult) -> list[str]:
-    """Names of the figures that a run has: of the disturbance and of the envelope only if its law knows them."""
-    missing = {"disturbance": result.true_disturbance is None, "envelope": result.envelope is None}
+    """Names of the figures that a run has: of the robot in space only, others only if its law knows what they show."""
+    missing = {
+        "robot": not result.in_space,
+        "disturbance": result.true_disturbance is None,
+        "envelope": result.envelope is None,
+    }
     return [name for name in FIGURES if not missing.get(name)]
 
 
 def write_gallery(result: TrackResult, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> list[Path]:
-    """Write path, errors, torques, speed error and, if the law has them, disturbance and operating envelope of a run.
+    """Write the figures of a run: see `figures_of`.
 
     Returns:
         The files, one per figure and format.

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from quasilpv.arrays import FloatArray
 from quasilpv.experiments.result import Disturbance, TrackResult
@@ -26,6 +27,12 @@ from quasilpv.figures.style import (
 AXES = "XYZ"
 """Of the base."""
 
+NARROWEST = 0.75
+"""Of the sides of a path's plot, the shorter one in parts of the longer one."""
+
+TALL = 3
+"""So many panels stand one above the other; more stand in two columns."""
+
 
 def plot_path(axes: Axes, result: TrackResult) -> None:
     """Draw the tool's path in the plane over its reference, m."""
@@ -40,7 +47,7 @@ def plot_path(axes: Axes, result: TrackResult) -> None:
 
 def plot_error(axes: Axes, result: TrackResult) -> None:
     """Draw the distance of the tool from its reference over time."""
-    distance = np.linalg.norm(result.tool_position_m - result.reference_position_m, axis=1)
+    distance = result.distance_m
     unit = length_unit(float(distance.max()))
     axes.plot(result.run.time_s, distance * unit.factor, color=BLUE, linewidth=0.8)
     axes.set_ylabel(f"distance from the reference ({unit.name})")
@@ -80,12 +87,23 @@ def path_figure(result: TrackResult) -> Figure:
             axes.plot(*reference[0], marker="o", color=REFERENCE_COLOUR, markersize=4)
             axes.set_aspect("equal", adjustable="box")
             axes.set_xlabel(f"{AXES[plane[0]]} (m)")
+            axes.xaxis.set_major_locator(MaxNLocator(4))
         left.plot(*actual.T, color=BLUE, linewidth=1.0, label="tool")
         right.plot(*(reference + factor * error).T, color=VERMILION, label=f"tool, error × {factor:g}")
         left.set_ylabel(f"{AXES[plane[1]]} (m)")
         for axes in (left, right):
             legend_above(axes)
+        _widen(left)
         return figure
+
+
+def _widen(axes: Axes) -> None:
+    """Room beside a path that is narrow, for the numbers below it."""
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    middle, half = limits.mean(axis=1), 0.5 * np.ptp(limits, axis=1)
+    half = np.maximum(half, NARROWEST * half.max())
+    axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
+    axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
 
 
 def error_figure(result: TrackResult) -> Figure:
@@ -107,19 +125,36 @@ def error_figure(result: TrackResult) -> Figure:
 
 
 def torque_figure(result: TrackResult) -> Figure:
-    """Applied torque of every joint over time, and its increments from sample to sample."""
-    torque, time_s = result.run.torque_nm, result.run.time_s
+    """Applied torque of every joint over time between its limits, and the increments from sample to sample."""
+    run, n = result.run, result.run.joints
+    columns = 1 if n <= TALL else 2
+    rows = math.ceil(n / columns)
     with style():
-        figure = new_figure(4.4, f"{result.title}: applied torque")
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        plot_joints(upper, time_s, torque)
-        plot_joints(lower, time_s[1:], np.diff(torque, axis=0), linewidth=0.5)
-        upper.set_ylabel("torque (N m)")
+        share = f"at a limit in {100.0 * result.metrics.share_at_limit:.3g} % of the samples"
+        figure = new_figure(1.15 * rows + 2.0, f"{result.title}: applied torque, {share}")
+        grid = figure.add_gridspec(rows + 1, columns, height_ratios=[*[1.0] * rows, 1.3])
+        panels = [figure.add_subplot(grid[joint % rows, joint // rows]) for joint in range(n)]
+        for joint, axes in enumerate(panels):
+            _plot_between_limits(axes, result, joint)
+            axes.tick_params(labelbottom=joint % rows == rows - 1 or joint == n - 1)
+        lower = figure.add_subplot(grid[rows, :])
+        plot_joints(lower, run.time_s[1:], np.diff(run.torque_nm, axis=0), linewidth=0.5)
         lower.set_ylabel("increment (N m)")
         lower.set_title(f"per sample, rms over the joints {result.metrics.rms_torque_increment_nm:.3g} N m")
-        legend_above(upper)
-        label_time(lower, time_s)
+        label_time(lower, run.time_s)
+        figure.align_ylabels()
         return figure
+
+
+def _plot_between_limits(axes: Axes, result: TrackResult, joint: int) -> None:
+    torque, limit = result.run.torque_nm[:, joint], float(result.torque_limit_nm[joint])
+    for side in (-limit, limit):
+        axes.axhline(side, color=BLACK, linewidth=0.8, linestyle="--")
+    axes.plot(result.run.time_s, torque, color=JOINT_COLOURS[joint], linewidth=0.9)
+    axes.set_ylabel(f"joint {joint + 1} (N m)")
+    used = 100.0 * float(np.abs(torque).max()) / limit
+    axes.set_title(f"at most {used:.3g} % of {limit:g} N m (dashed)")
+    axes.set_xlim(0.0, float(result.run.time_s[-1]))
 
 
 def disturbance_figure(result: TrackResult) -> Figure:
@@ -191,7 +226,7 @@ def label_time(axes: Axes, time_s: FloatArray) -> None:
 
 def exaggeration(error: FloatArray, reference: FloatArray) -> float:
     """The round factor (1, 2 or 5 times a power of ten) that makes the largest error about a tenth of the extent."""
-    largest = float(np.max(np.hypot(*error.T)))
+    largest = float(np.max(np.linalg.norm(error, axis=1)))
     extent = float(np.max(np.ptp(reference, axis=0)))
     if largest == 0.0 or 0.1 * extent <= largest:
         return 1.0

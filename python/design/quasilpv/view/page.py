@@ -43,6 +43,7 @@ class Page:
     Attributes:
         url: of the page.
         player: its clock.
+        scene: what is drawn.
     """
 
     def __init__(self, playback: Playback, port: int, live: LiveMotion | None = None) -> None:
@@ -60,7 +61,7 @@ class Page:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(_PANEL_WIDTH)
         gui.set_panel_label(playback.title)
-        self._scene = RobotScene(self._server, playback)
+        self.scene = RobotScene(self._server, playback)
         self._add_controls()
         self._curves = curves_of(playback)
         self._plots = [self._add_plot(curves) for curves in self._curves]
@@ -92,11 +93,11 @@ class Page:
     # ---- drawing ---------------------------------------------------------------------------------------------------
 
     def _draw(self, instant: Instant) -> None:
-        self._scene.show(instant)
+        self.scene.show(instant)
         self._play.label = "Pause" if self.player.playing else "Play"
         now_s = min(max(self.player.time_s, self._time.min), self._time.max)
         self._time.value = now_s  # type: ignore[misc]  # mypy does not see its setter
-        self._status.content = _status(instant, self._scene.exaggeration)
+        self._status.content = _status(instant, self.scene.exaggeration)
         if self._since_plots_s >= PLOT_PERIOD_S or not self.player.playing:
             self._since_plots_s = 0.0
             for plot, curves in zip(self._plots, self._curves, strict=True):
@@ -112,7 +113,7 @@ class Page:
             self._playback.begin_s,
             max(self._playback.end_s, self._playback.begin_s + 1e-3),
         )
-        self._scene.show_paths(self._playback)
+        self.scene.show_paths(self._playback)
         self._curves = curves_of(self._playback)
         while len(self._plots) < len(self._curves):
             self._plots.append(self._add_plot(self._curves[len(self._plots)]))
@@ -143,12 +144,12 @@ class Page:
             speed = gui.add_dropdown("speed", [f"{speed:g}" for speed in SPEEDS], initial_value="1")
             speed.on_update(lambda _: self._actions.put(lambda: setattr(self.player, "speed", float(speed.value))))
         with gui.add_folder("show", expand_by_default=False):
-            shadow = gui.add_checkbox("robot on its reference", self._scene.show_shadow)
+            shadow = gui.add_checkbox("robot on its reference", self.scene.show_shadow)
             magnified = gui.add_checkbox("tool path, error magnified", True)
         gui.add_html(_legend(playback.motion.angle_rad.shape[1]))
 
         def show(_: object) -> None:
-            self._scene.set_visible(shadow=shadow.value, magnified=magnified.value)
+            self.scene.set_visible(shadow=shadow.value, magnified=magnified.value)
 
         shadow.on_update(show)
         magnified.on_update(show)

@@ -16,7 +16,7 @@ from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.logged import logged_run
-from quasilpv.systems.robots.mechanism import PlanarMechanism
+from quasilpv.systems.robots.drawing import Drawing
 from quasilpv.telemetry import RunLog
 from quasilpv.telemetry.codes import STATES, word
 from quasilpv.telemetry.message_types import Records
@@ -137,7 +137,7 @@ class Playback:
 
     title: str
     motion: Motion
-    mechanism: PlanarMechanism
+    mechanism: Drawing
     disturbance_unit: str
 
     @property
@@ -152,13 +152,13 @@ class Playback:
 
     @cached_property
     def tool_m(self) -> FloatArray:
-        """(N, 2) where the tool is."""
-        return _tool(self.mechanism, self.motion.angle_rad)
+        """(N, 2) or (N, 3), where the tool is."""
+        return self.mechanism.tool_path(self.motion.angle_rad)
 
     @cached_property
     def reference_tool_m(self) -> FloatArray:
-        """(N, 2) where it should be."""
-        return _tool(self.mechanism, self.motion.reference_angle_rad)
+        """The same, where it should be."""
+        return self.mechanism.tool_path(self.motion.reference_angle_rad)
 
     def at(self, time_s: float) -> Instant:
         """The state of the run at a time."""
@@ -185,9 +185,9 @@ class Instant:
     Attributes:
         sample: index into the motion.
         time_s: of that sample.
-        links_m: (points, 2) the robot's links as one line.
+        links_m: (points, 2) or (points, 3), the robot's links as one line.
         reference_links_m: the same on the reference.
-        error_m: (2,) of the tool.
+        error_m: (2,) or (3,) of the tool.
         state: of the controller, in words.
         flags: fault bits.
     """
@@ -243,7 +243,3 @@ class Player:
         """The run has grown: while playing, show its end."""
         self.begin_s, self.end_s = begin_s, end_s
         self.seek(end_s if self.playing else self.time_s)
-
-
-def _tool(mechanism: PlanarMechanism, angle: FloatArray) -> FloatArray:
-    return np.array([mechanism.forward_kinematics(row)[:2] for row in angle])

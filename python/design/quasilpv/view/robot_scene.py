@@ -1,17 +1,18 @@
 """The robot in three dimensions: links as bars, joints as pins, its reference as a shadow, both paths of the tool.
 
-The mechanism moves in the vertical plane y = 0 of the scene: X to the right, Y of the mechanism up.
+A planar mechanism moves in the vertical plane y = 0 of the scene: X to the right, Y of the mechanism up. A robot in
+space stands in it as it stands in its base's frame.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 import viser
 
 from quasilpv.arrays import FloatArray
+from quasilpv.figures.space import Viewpoint
 from quasilpv.figures.tracking import exaggeration
 from quasilpv.view.playback import Instant, Playback
 
@@ -25,7 +26,11 @@ SHADOW_COLOUR, REFERENCE_COLOUR, TOOL_COLOUR, ERROR_COLOUR = (
     (213, 94, 0),
 )
 PATH_POINTS = 400
-_EAST = np.array([1.0, 0.0])
+BEFORE_THE_PLANE = np.array([0.3, -1.2, 0.25])
+"""Where the camera starts, from the middle of a planar robot, in parts of its extent."""
+DISTANCE = 1.35
+"""The same of a robot in space, from where `Viewpoint` looks."""
+_EAST = np.array([1.0, 0.0, 0.0])
 
 
 class RobotScene:
@@ -36,6 +41,7 @@ class RobotScene:
         playback: of the run.
 
     Attributes:
+        robot: its links and joints.
         exaggeration: by which the error is magnified.
         show_shadow: whether the robot on its reference can be told from the robot.
     """
@@ -45,11 +51,11 @@ class RobotScene:
         scene = server.scene
         scene.set_up_direction("+z")
         links = playback.at(playback.begin_s).links_m
-        lengths = np.hypot(*np.diff(links, axis=0).T)
+        lengths = np.linalg.norm(np.diff(links, axis=0), axis=1)
         # A link that only ties things together, as the spring of the disc, may have no length at some time.
         width = 0.075 * float(np.max(lengths))
-        self._bars = _Bars(scene, "robot", links.shape[0], width, (LINK_COLOUR, None))
-        self._shadow = _Bars(scene, "reference robot", links.shape[0], 0.6 * width, (SHADOW_COLOUR, 0.35))
+        self.robot = _Bars(scene, "robot", links.shape, width, (LINK_COLOUR, None))
+        self._shadow = _Bars(scene, "reference robot", links.shape, 0.6 * width, (SHADOW_COLOUR, 0.35))
         self._scene = scene
         self._line_width = 0.12 * width
         self._shows_magnified = True
@@ -61,20 +67,24 @@ class RobotScene:
     def _place_camera(self, server: viser.ViserServer, playback: Playback) -> None:
         count = playback.motion.samples
         angles = playback.motion.angle_rad[:: max(count // 50, 1)]
-        points = np.concatenate([playback.mechanism.skeleton(angle) for angle in angles])
+        points = np.concatenate([in_space(playback.mechanism.skeleton(angle)) for angle in angles])
         low, high = points.min(axis=0), points.max(axis=0)
         centre, extent = (low + high) / 2.0, float(max(high - low))
+        reference = playback.reference_tool_m
+        stands = reference.shape[1] > 2
+        self._towards = DISTANCE * Viewpoint.of_path(reference).direction if stands else BEFORE_THE_PLANE
         # The controls cover the right quarter of the page.
-        x, z = centre + extent * np.array([0.22, 0.0])
-        server.initial_camera.look_at = (x, 0.0, z)
-        server.initial_camera.position = (x + 0.3 * extent, -1.2 * extent, z + 0.25 * extent)
+        right = np.cross([0.0, 0.0, 1.0], self._towards)
+        look_at = centre + 0.22 * extent * right / np.linalg.norm(right)
+        server.initial_camera.look_at = _triple(look_at)
+        server.initial_camera.position = _triple(look_at + extent * self._towards)
         self._scene.add_grid(
             "floor",
             width=4.0 * extent,
             height=4.0 * extent,
             cell_size=0.1 * extent,
             section_size=0.5 * extent,
-            position=(centre[0], 0.0, low[1] - 0.15 * extent),
+            position=(centre[0], centre[1], min(low[2], 0.0) if stands else low[2] - 0.15 * extent),
         )
 
     def show_paths(self, playback: Playback) -> None:
@@ -94,7 +104,7 @@ class RobotScene:
     def _path(
         self, name: str, points: FloatArray, colour: Colour, widths: float, *, behind: float
     ) -> viser.LineSegmentsHandle:
-        place = (0.0, behind * self._line_width, 0.0)
+        place = _triple(-behind * self._line_width * self._towards / np.linalg.norm(self._towards))
         width = widths * self._line_width
         return self._scene.add_line_segments(
             f"/paths/{name}", _segments(points), colour, thickness=width, position=place
@@ -102,7 +112,7 @@ class RobotScene:
 
     def show(self, instant: Instant) -> None:
         """Move everything to an instant."""
-        self._bars.move(instant.links_m)
+        self.robot.move(instant.links_m)
         self._shadow.move(instant.reference_links_m)
         drawn = int(np.searchsorted(self._rows, instant.sample, side="right"))
         for handle, segments in self._segments:
@@ -114,60 +124,64 @@ class RobotScene:
         self._shows_magnified = self._magnified.visible = magnified
 
 
-@dataclass
-class _Placement:
-    position: tuple[float, float, float]
-    wxyz: tuple[float, float, float, float]
-
-
 class _Bars:
-    """Links and pins of one robot, below one frame of the scene."""
+    """Links and joints of one robot, below one frame of the scene: pins in a plane, balls in space."""
 
     def __init__(
-        self, scene: viser.SceneApi, name: str, points: int, width: float, look: tuple[Colour, float | None]
+        self, scene: viser.SceneApi, name: str, shape: tuple[int, ...], width: float, look: tuple[Colour, float | None]
     ) -> None:
+        points, dimensions = shape
         self.root = scene.add_frame(f"/{name}", show_axes=False)
         colour, clear = look
         # Bars have unit length and are stretched, because a spring changes its own.
-        self._bars = [
+        self.links = [
             scene.add_box(f"/{name}/link {k + 1}", colour, (1.0, 0.6 * width, width), opacity=clear)
             for k in range(points - 1)
         ]
-        self._pins = [
-            scene.add_cylinder(
-                f"/{name}/pin {k + 1}",
-                radius=0.62 * width,
-                height=width,
-                color=BASE_COLOUR if k == 0 else PIN_COLOUR,
-                opacity=clear,
-                wxyz=(np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0),
-            )
-            for k in range(points)
-        ]
+        along_y = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
+        self.joints: list[viser.CylinderHandle | viser.IcosphereHandle] = []
+        for k in range(points):
+            own, tint, radius = f"/{name}/joint {k + 1}", BASE_COLOUR if k == 0 else PIN_COLOUR, 0.62 * width
+            if dimensions == 2:
+                self.joints.append(scene.add_cylinder(own, radius, width, color=tint, opacity=clear, wxyz=along_y))
+            else:
+                self.joints.append(scene.add_icosphere(own, radius, color=tint, opacity=clear))
 
-    def move(self, points: FloatArray) -> None:
+    def move(self, links: FloatArray) -> None:
         """Put every link between its ends."""
-        for bar, start, end in zip(self._bars, points[:-1], points[1:], strict=True):
+        points = in_space(links)
+        for bar, start, end in zip(self.links, points[:-1], points[1:], strict=True):
             along = end - start
-            length = float(np.hypot(*along))
-            placed = _placement((start + end) / 2.0, along if length > 0.0 else _EAST)
-            bar.position, bar.wxyz = placed.position, placed.wxyz
+            length = float(np.linalg.norm(along))
+            bar.position = _triple((start + end) / 2.0)
+            bar.wxyz = turned_from_x(along / length if length > 0.0 else _EAST)
             bar.scale = (max(length, 1e-6), 1.0, 1.0)
-        for pin, point in zip(self._pins, points, strict=True):
-            pin.position = _in_space(point)
+        for joint, point in zip(self.joints, points, strict=True):
+            joint.position = _triple(point)
 
 
-def _placement(point: FloatArray, along: FloatArray) -> _Placement:
-    """Where a bar along x goes that points along a direction of the plane: a turn about -y by its angle."""
-    half = 0.5 * float(np.arctan2(along[1], along[0]))
-    return _Placement(_in_space(point), (float(np.cos(half)), 0.0, -float(np.sin(half)), 0.0))
+def turned_from_x(direction: FloatArray) -> tuple[float, float, float, float]:
+    """Quaternion (w, x, y, z) of the least turn from the x axis to a unit vector; backwards about -y."""
+    w = 1.0 + float(direction[0])
+    if w < 1e-12:
+        return 0.0, 0.0, -1.0, 0.0
+    x, y, z = np.cross(_EAST, direction) / np.sqrt(2.0 * w)
+    return float(np.sqrt(0.5 * w)), float(x), float(y), float(z)
 
 
-def _in_space(point: FloatArray) -> tuple[float, float, float]:
-    return float(point[0]), 0.0, float(point[1])
+def in_space(points: FloatArray) -> FloatArray:
+    """Points of the vertical plane, (N, 2), in the scene; those in space, (N, 3), are there already."""
+    if points.shape[1] > 2:
+        return points
+    return np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]])
+
+
+def _triple(values: FloatArray) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
 
 
 def _segments(points: FloatArray) -> FloatArray:
-    """A line through points of the plane as segments in space, (points - 1, 2, 3)."""
-    space = np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]])
+    """A line through points as segments in space, (points - 1, 2, 3)."""
+    space = in_space(points)
     return np.stack([space[:-1], space[1:]], axis=1) if len(points) > 1 else np.repeat(space[None], 2, axis=1)

@@ -10,6 +10,9 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, Self
 
+import numpy as np
+
+from quasilpv.arrays import FloatArray
 from quasilpv.systems.descriptor.premise import Premise
 from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.robots.arm_parameters import OperatingDomain
@@ -36,6 +39,10 @@ class PlanarMechanism(PlanarDynamics, ToolKinematics, Drawing):
     @abstractmethod
     def plant_document(self, label: str) -> dict[str, Any]:
         """The ``plant`` member of a scenario file."""
+
+    def tool_path(self, angles: FloatArray) -> FloatArray:
+        """See `Drawing`."""
+        return np.array([self.forward_kinematics(row)[:2] for row in angles])
 
     @cached_property
     def symbolic(self) -> SymbolicMechanism:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from quasilpv.arrays import FloatArray
+from quasilpv.systems.robots.drawing import Drawing
 from quasilpv.systems.robots.tree import KinematicTree
 
 COULOMB_SPEED_RAD_S = 0.01
@@ -16,7 +17,7 @@ COULOMB_SPEED_RAD_S = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class TreeMechanism:
+class TreeMechanism(Drawing):
     """A chain of bodies, and what rubs at its joints.
 
     Attributes:
@@ -61,6 +62,10 @@ class TreeMechanism:
     def skeleton(self, theta: ArrayLike) -> FloatArray:
         """The arm as one line: base, joints, tool, (n + 2) x 3, m: what a drawing shows."""
         return np.vstack([np.zeros(3), *(origin for _, origin in self.tree.frames(theta))])
+
+    def tool_path(self, angles: FloatArray) -> FloatArray:
+        """See `Drawing`."""
+        return np.array([self.forward_kinematics(row) for row in angles])
 
     def parameters_document(self) -> dict[str, Any]:
         """The chain as JSON-able data, a mechanism of kind ``tree``."""
