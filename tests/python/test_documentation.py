@@ -29,7 +29,13 @@ README = ROOT / "README.md"
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 
 # Quick enough for every run; all other lines are run, page by page and in order, by ./tools/test --full.
-QUICK_COMMANDS = ("design solve ", "design boundary ", "design complexity ", "design reproduce fig-II.1")
+QUICK_COMMANDS = (
+    "design solve ",
+    "design boundary ",
+    "design complexity ",
+    "design reproduce fig-II.1",
+    "design robot show examples/",
+)
 
 NOT_RUN = {
     "./tools/demo": "installs and builds",

@@ -44,7 +44,7 @@ DEFAULT_CONTROLLERS = (
     "dob-torque",
     "dob-acceleration",
 )
-CONTROLLERS_IN_SPACE = ("pid-tuned", "ctc-tuned", "dob-acceleration")
+CONTROLLERS_IN_SPACE = ("pd-tuned", "pid-tuned", "ctc-tuned", "ctc-dob-tuned", "dob-acceleration")
 COARSE_ENCODER_BITS = 17
 
 
@@ -94,8 +94,9 @@ def track_command(
 ) -> None:
     """Run scenarios in closed loop: every controller, one table, figures of every run.
 
-    By default that of an arm in a plane also runs with 17-bit encoders, designed for them. Designs are kept in
-    out/cache and made again when anything they depend on changes.
+    By default that of an arm in a plane also runs with 17-bit encoders, designed for them. Designs of the built-in
+    ur5 are shipped and verified anew; all others are kept in out/cache and made again when anything they depend on
+    changes.
 
     \b
     Examples:

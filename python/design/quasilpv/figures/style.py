@@ -31,11 +31,12 @@ BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = (
     "#D55E00",
     "#CC79A7",
 )
-PLUM, BROWN, NAVY, LIME = "#A0208F", "#6B4A00", "#12355B", "#A6D854"
+PLUM, BROWN, NAVY, LIME, GREY = "#A0208F", "#6B4A00", "#12355B", "#A6D854", "#B3B3B3"
 """Shades of `PURPLE`, `ORANGE`, `SKY` and `GREEN`, for variants of what these stand for."""
 JOINT_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 CONTROLLER_COLOURS = {
     "pid": PURPLE,
+    "pd-tuned": GREY,
     "pid-tuned": PLUM,
     "ctc": ORANGE,
     "ctc-tuned": BROWN,

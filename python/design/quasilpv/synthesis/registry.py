@@ -58,6 +58,11 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
         "computed torque with a disturbance observer (Mohammadi et al. 2013), measured speeds",
         "baselines.printed.computed_torque_with_observer",
     ),
+    "pd-tuned": ControllerKind(
+        "pid without its integral, in space PD with gravity, tuned as dob-acceleration is",
+        "baselines.tuned.pd_tuned",
+        in_space="baselines.in_space.pd_gravity_tuned",
+    ),
     "pid-tuned": ControllerKind(
         "pid, in space PID with gravity, tuned as dob-acceleration is",
         "baselines.tuned.pid_tuned",
@@ -69,7 +74,9 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
         in_space="baselines.in_space.computed_torque_tuned",
     ),
     "ctc-dob-tuned": ControllerKind(
-        "ctc-dob, tuned as dob-acceleration is", "baselines.tuned.computed_torque_with_observer_tuned"
+        "ctc-dob, tuned as dob-acceleration is",
+        "baselines.tuned.computed_torque_with_observer_tuned",
+        in_space="baselines.in_space.computed_torque_with_observer_tuned",
     ),
     "hinf-tracking": ControllerKind(
         "H-infinity PI tracking with limited gains (Dehak 2022, Theorem III.10), measured speeds, no feedforward",

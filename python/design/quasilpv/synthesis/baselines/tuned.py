@@ -54,6 +54,7 @@ PID: Axes = {
     "inertia_scale": _geometric(0.5, 8.0, 6),
     "payload_fraction": (0.25, 1.0),
 }
+PD: Axes = {name: values for name, values in PID.items() if name != "integral_ratio"}
 COMPUTED_TORQUE: Axes = {
     "bandwidth": _geometric(0.02, 0.3, 10),
     "integral_ratio": (0.1, 0.3, 1.0),
@@ -89,6 +90,12 @@ def pid_tuned(robot: Robot, specification: Specification, progress: Progress = n
     """PID with feedforward, tuned. InfeasibleError: no point of the search meets the specification."""
     search = TuningSearch(robot, specification, pid_law, PID, PlantGrid.screen(robot), progress)
     return _designed("pid-tuned", search, pid_design)
+
+
+def pd_tuned(robot: Robot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
+    """PD with feedforward, tuned. InfeasibleError: no point of the search meets the specification."""
+    search = TuningSearch(robot, specification, pid_law, PD, PlantGrid.screen(robot), progress)
+    return _designed("pd-tuned", search, pid_design)
 
 
 def computed_torque_tuned(

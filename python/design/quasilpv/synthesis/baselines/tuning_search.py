@@ -96,7 +96,7 @@ class TuningSearch:
         rate, period = self.specification.rate_hz, self.specification.sample_period_s
         return Tuning(
             bandwidth_rad_s=point["bandwidth"] * rate,
-            integral_ratio=point["integral_ratio"],
+            integral_ratio=point.get("integral_ratio", 0.0),
             velocity_filter_time_constant_s=point["filter_time"] * period,
             observer_bandwidth_rad_s=point.get("observer_bandwidth", 0.0) * rate,
             inertia_scale=point["inertia_scale"],
