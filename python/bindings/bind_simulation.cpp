@@ -94,11 +94,32 @@ py::array_t<double> column_to_numpy(const Record::Column& column) {
   return result;
 }
 
-py::dict run(const Artifact& artifact, const Trajectory& trajectory, const Scenario& scenario) {
+/// An integrator in Python: a function of (from_s, to_s, state, torque) that returns the state at to_s.
+class PythonIntegrator : public Integrator {
+ public:
+  PythonIntegrator(const Plant& plant, const py::object& advance) : plant_(plant), advance_(advance) {}
+
+  void advance(double from_s, double to_s, Eigen::VectorXd& y) override {
+    const py::gil_scoped_acquire acquire;
+    const py::object moved = advance_(from_s, to_s, to_numpy(y), bindings::to_numpy(plant_.torque(), plant_.joints()));
+    y = to_vector(py::cast<DoubleArray>(moved), plant_.size(), "state");
+  }
+
+ private:
+  const Plant& plant_;
+  const py::object& advance_;  // of the call that runs the loop
+};
+
+py::dict run(const Artifact& artifact, const Trajectory& trajectory, const Scenario& scenario,
+             const py::object& advance) {
+  IntegratorFactory integrator;
+  if (!advance.is_none()) {
+    integrator = [&](const Plant& plant) { return std::make_unique<PythonIntegrator>(plant, advance); };
+  }
   RunRecord record;
   {
     const py::gil_scoped_release release;
-    record = run_closed_loop(scenario, artifact, trajectory);
+    record = run_closed_loop(scenario, artifact, trajectory, integrator);
   }
   py::dict columns;
   for (const Record::Column& column : record.samples.columns()) {
@@ -137,7 +158,9 @@ void bind_simulation(py::module_& module) {
       .def("mass_matrix", &BoundPlant::mass_matrix, py::arg("angle"), "M(theta), kg m^2, shape (joints, joints).");
 
   module.def("run_closed_loop", &run, py::arg("artifact"), py::arg("trajectory"), py::arg("scenario"),
-             "The closed loop in lock-step: columns by name, shape (samples,) or (samples, joints). Releases the GIL.");
+             py::arg("advance") = py::none(),
+             "The closed loop in lock-step: columns by name, shape (samples,) or (samples, joints). Releases the GIL. "
+             "`advance(from_s, to_s, state, torque)` integrates the plant instead of the scenario's integrator.");
 }
 
 }  // namespace quasilpv::bindings

@@ -1,5 +1,6 @@
 """The C++ runtime library. All arrays are of double; joint arrays have shape (joints,), SI units."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -228,5 +229,13 @@ class Tree:
     def energy(self, coordinate: npt.ArrayLike, speed: npt.ArrayLike) -> float:
         """Kinetic plus potential, J."""
 
-def run_closed_loop(artifact: Artifact, trajectory: Trajectory, scenario: Scenario) -> dict[str, _Array]:
-    """The closed loop in lock-step: columns by name, shape (samples,) or (samples, joints)."""
+def run_closed_loop(
+    artifact: Artifact,
+    trajectory: Trajectory,
+    scenario: Scenario,
+    advance: Callable[[float, float, _Array, _Array], _Array] | None = None,
+) -> dict[str, _Array]:
+    """The closed loop in lock-step: columns by name, shape (samples,) or (samples, joints).
+
+    `advance(from_s, to_s, state, torque)` integrates the plant instead of the scenario's integrator.
+    """

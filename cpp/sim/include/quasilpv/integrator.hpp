@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
 #include <variant>
 
@@ -33,9 +34,18 @@ struct Rk4Options {
   int steps_per_sample = 1;
 };
 
-using IntegratorOptions = std::variant<IdaOptions, Rk4Options>;
+/// The same motion by MuJoCo, which knows the plant from its document: only a caller that has MuJoCo can make it.
+struct MujocoOptions {
+  int steps_per_sample = 1;
+};
 
-/// The integrator a scenario asks for. `plant` must outlive it. INIT-ONLY. Throws PlantError.
+using IntegratorOptions = std::variant<IdaOptions, Rk4Options, MujocoOptions>;
+
+/// Makes the integrator of one plant, which must outlive it.
+using IntegratorFactory = std::function<std::unique_ptr<Integrator>(const Plant&)>;
+
+/// The integrator a scenario asks for. `plant` must outlive it. INIT-ONLY. Throws PlantError; InputError for one that
+/// is not made here.
 std::unique_ptr<Integrator> make_integrator(const IntegratorOptions& options, const Plant& plant,
                                             double sample_period_s);
 

@@ -26,7 +26,10 @@ class PlantSession {
  public:
   /// INIT-ONLY. Throws InputError if `sample_period_s` is not positive, the duration is less than half a sample, or the
   /// transport delay is longer than a sample; PlantError if the initial state is not one of the mechanism.
-  PlantSession(const Scenario& scenario, double sample_period_s);
+  PlantSession(const Scenario& scenario, double sample_period_s) : PlantSession(scenario, sample_period_s, {}) {}
+
+  /// The same with an integrator of the caller's instead of the scenario's; an empty factory stands for the scenario's.
+  PlantSession(const Scenario& scenario, double sample_period_s, const IntegratorFactory& integrator);
 
   int joints() const noexcept { return plant_->joints(); }
   double sample_period_s() const noexcept { return sample_period_s_; }

@@ -36,7 +36,9 @@ RunRecord run_closed_loop(const Scenario& scenario, double sample_period_s, cons
 /// controller and trajectory differ in the number of joints.
 RunRecord run_closed_loop(const Scenario& scenario, Controller& controller, const Trajectory& trajectory);
 
-/// The same with the controller and the monitor of an artifact: the record has the columns of MonitorColumns too.
-RunRecord run_closed_loop(const Scenario& scenario, const Artifact& artifact, const Trajectory& trajectory);
+/// The same with the controller and the monitor of an artifact: the record has the columns of MonitorColumns too. A
+/// factory that is not empty makes the integrator instead of the scenario.
+RunRecord run_closed_loop(const Scenario& scenario, const Artifact& artifact, const Trajectory& trajectory,
+                          const IntegratorFactory& integrator = {});
 
 }  // namespace quasilpv

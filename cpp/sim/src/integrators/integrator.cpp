@@ -1,5 +1,6 @@
 #include "quasilpv/integrator.hpp"
 
+#include "quasilpv/errors.hpp"
 #include "quasilpv/ida_integrator.hpp"
 #include "quasilpv/rk4_integrator.hpp"
 
@@ -10,7 +11,10 @@ std::unique_ptr<Integrator> make_integrator(const IntegratorOptions& options, co
   if (const auto* ida = std::get_if<IdaOptions>(&options)) {
     return std::make_unique<IdaIntegrator>(plant, *ida);
   }
-  return std::make_unique<Rk4Integrator>(plant, sample_period_s / std::get<Rk4Options>(options).steps_per_sample);
+  if (const auto* rk4 = std::get_if<Rk4Options>(&options)) {
+    return std::make_unique<Rk4Integrator>(plant, sample_period_s / rk4->steps_per_sample);
+  }
+  throw InputError("scenario", "integrator.kind", "mujoco", "ida or rk4: MuJoCo runs in the process of design track");
 }
 
 }  // namespace quasilpv

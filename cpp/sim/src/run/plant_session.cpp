@@ -30,7 +30,7 @@ std::int64_t count_samples(const Scenario& scenario, double sample_period_s) {
 
 }  // namespace
 
-PlantSession::PlantSession(const Scenario& scenario, double sample_period_s)
+PlantSession::PlantSession(const Scenario& scenario, double sample_period_s, const IntegratorFactory& integrator)
     : plant_(scenario.make_plant()),
       sensors_(scenario.sensors, plant_->joints(), sample_period_s),
       sample_period_s_(sample_period_s),
@@ -38,7 +38,7 @@ PlantSession::PlantSession(const Scenario& scenario, double sample_period_s)
       torque_limit_nm_(scenario.torque_limit_nm),
       samples_(count_samples(scenario, sample_period_s)),
       state_(plant_->initial_state(scenario.initial_angle, scenario.initial_speed)) {
-  integrator_ = make_integrator(scenario.integrator, *plant_, sample_period_s);
+  integrator_ = integrator ? integrator(*plant_) : make_integrator(scenario.integrator, *plant_, sample_period_s);
   observe(0.0);
 }
 

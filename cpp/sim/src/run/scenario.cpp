@@ -63,7 +63,11 @@ IntegratorOptions integrator(const Field& field) {
     field.only({"kind", "steps_per_sample"});
     return Rk4Options{static_cast<int>(field["steps_per_sample"].integer(1, kMaxStepsPerSample))};
   }
-  field["kind"].fail_choice({"ida", "rk4"});
+  if (kind == "mujoco") {
+    field.only({"kind", "steps_per_sample"});
+    return MujocoOptions{static_cast<int>(field["steps_per_sample"].integer(1, kMaxStepsPerSample))};
+  }
+  field["kind"].fail_choice({"ida", "rk4", "mujoco"});
 }
 
 std::vector<SineTorque> external_torque(const Field& field, int joints) {

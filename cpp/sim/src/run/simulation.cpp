@@ -17,17 +17,8 @@ void require_joints(const Scenario& scenario, const std::string& source, int joi
   }
 }
 
-RunRecord follow(const Scenario& scenario, double sample_period_s, const Trajectory& trajectory,
-                 const StepFunction& step) {
-  require_joints(scenario, "trajectory '" + trajectory.name() + "'", trajectory.joints());
-  return run_closed_loop(scenario, sample_period_s, step, [&](double time_s) { return trajectory.evaluate(time_s); });
-}
-
-}  // namespace
-
-RunRecord run_closed_loop(const Scenario& scenario, double sample_period_s, const StepFunction& step,
-                          const ReferenceFunction& reference) {
-  PlantSession session(scenario, sample_period_s);
+RunRecord run_session(PlantSession& session, double sample_period_s, const StepFunction& step,
+                      const ReferenceFunction& reference) {
   RunRecord run;
   run.sample_period_s = sample_period_s;
   run.joints = session.joints();
@@ -55,23 +46,40 @@ RunRecord run_closed_loop(const Scenario& scenario, double sample_period_s, cons
   return run;
 }
 
+RunRecord follow(const Scenario& scenario, double sample_period_s, const Trajectory& trajectory,
+                 const StepFunction& step, const IntegratorFactory& integrator) {
+  require_joints(scenario, "trajectory '" + trajectory.name() + "'", trajectory.joints());
+  PlantSession session(scenario, sample_period_s, integrator);
+  return run_session(session, sample_period_s, step, [&](double time_s) { return trajectory.evaluate(time_s); });
+}
+
+}  // namespace
+
+RunRecord run_closed_loop(const Scenario& scenario, double sample_period_s, const StepFunction& step,
+                          const ReferenceFunction& reference) {
+  PlantSession session(scenario, sample_period_s);
+  return run_session(session, sample_period_s, step, reference);
+}
+
 RunRecord run_closed_loop(const Scenario& scenario, Controller& controller, const Trajectory& trajectory) {
   require_joints(scenario, "controller", controller.joints());
   controller.reset();
   return follow(scenario, controller.sample_period_s(), trajectory,
-                [&](const StepInput& input) { return controller.step(input); });
+                [&](const StepInput& input) { return controller.step(input); }, {});
 }
 
-RunRecord run_closed_loop(const Scenario& scenario, const Artifact& artifact, const Trajectory& trajectory) {
+RunRecord run_closed_loop(const Scenario& scenario, const Artifact& artifact, const Trajectory& trajectory,
+                          const IntegratorFactory& integrator) {
   require_joints(scenario, "artifact '" + artifact.name() + "'", artifact.joints());
   Controller controller(artifact);
   const Monitor monitor(artifact);
   std::vector<MonitorReport> seen;
-  RunRecord run = follow(scenario, artifact.sample_period_s(), trajectory, [&](const StepInput& input) {
+  const StepFunction step = [&](const StepInput& input) {
     const StepReport report = controller.step(input);
     seen.push_back(monitor.observe(input, report));
     return report;
-  });
+  };
+  RunRecord run = follow(scenario, artifact.sample_period_s(), trajectory, step, integrator);
   MonitorColumns columns(run.samples);
   for (const MonitorReport& sample : seen) {
     columns.append(sample);

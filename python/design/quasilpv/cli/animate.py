@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -53,14 +53,13 @@ def animate_command(
     from quasilpv.cli.results import print_results
     from quasilpv.cli.session import Session, draw_results
     from quasilpv.experiments.result import Variant
-    from quasilpv.experiments.setup import PlantKind
     from quasilpv.scenarios import tracking_experiment
 
     formats = formats_of(figure_formats)
     experiments = [tracking_experiment(name) for name in dict.fromkeys(scenarios or DEFAULT_SCENARIOS)]
     bits = ENCODER_BITS if encoder_bits is None else encoder_bits
     variants = [Variant(DEFAULT_CONTROLLER, bits, compensated) for compensated in (False, True)]
-    session = Session(None, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
+    session = Session(None, rate_hz, plant_kind(plant, experiments), out, log)
     results: list[TrackResult] = []
     made: list[dict[str, Any]] = []
     with progress(len(experiments) * (len(variants) + 1)) as steps:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -80,7 +80,7 @@ def hil_command(
     from quasilpv.cli.session import Session
     from quasilpv.experiments.hil import RealTimeOptions, require_identical
     from quasilpv.experiments.result import Variant
-    from quasilpv.experiments.setup import PlantKind, variant_of
+    from quasilpv.experiments.setup import variant_of
     from quasilpv.scenarios import tracking_experiment
 
     if priority is not None and not real_time:
@@ -89,10 +89,14 @@ def hil_command(
     variant = Variant(require_controller(controller), ENCODER_BITS if encoder_bits is None else encoder_bits)
     if given is not None:
         variant = variant_of(given, sensors_of(variant.encoder_bits))
-    session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
+    if plant == "mujoco":
+        expected = "nominal or perturbed: qlpv-simulator has no MuJoCo, design track has"
+        raise InputError("command line", "--plant", plant, expected)
+    experiment = tracking_experiment(scenario)
+    session = Session(given, rate_hz, plant_kind(plant, [experiment]), out, log)
     over_lcm, in_process = _run_both(
         session,
-        tracking_experiment(scenario),
+        experiment,
         variant,
         RealTimeOptions(silence_s, hold_s, priority) if real_time else None,
         url=url,

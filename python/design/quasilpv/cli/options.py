@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias, cast
 
 import typer
 
@@ -17,10 +17,14 @@ from quasilpv.synthesis import CONTROLLERS, ControllerKind, DesignRequest, Speci
 if TYPE_CHECKING:
     from quasilpv.artifact import Artifact
     from quasilpv.experiments.result import Variant
-    from quasilpv.scenarios import Sensors
+    from quasilpv.experiments.setup import PlantKind
+    from quasilpv.scenarios import Sensors, TrackingExperiment
     from quasilpv.systems.robots.registry import AnyRobot
 
 SHORT_NAMES = {"acceleration": "dob-acceleration", "moving": "dob-moving", "torque": "dob-torque"}
+
+
+PLANTS = ("nominal", "perturbed", "mujoco")
 
 
 def _default_rates() -> str:
@@ -61,7 +65,7 @@ ActivityOption: TypeAlias = Annotated[
     ),
 ]
 PlantOption: TypeAlias = Annotated[
-    str, typer.Option("--plant", help="nominal, or perturbed: the full payload the design must cover.")
+    str, typer.Option("--plant", help="nominal, perturbed: the full payload, or mujoco: the latter, moved by MuJoCo.")
 ]
 LogOption: TypeAlias = Annotated[bool, typer.Option("--log/--no-log", help="Write the log of every run.")]
 FormatOption: TypeAlias = Annotated[
@@ -73,15 +77,23 @@ ArtifactOption: TypeAlias = Annotated[
 ]
 
 
-def plant_kind(text: str) -> str:
-    """``nominal`` or ``perturbed``.
+def plant_kind(text: str, experiments: Sequence[TrackingExperiment]) -> PlantKind:
+    """``nominal``, ``perturbed`` or ``mujoco``.
 
     Raises:
-        InputError: neither.
+        InputError: none of them; MuJoCo is not installed, or an experiment is that of a robot in a plane.
     """
-    if text not in ("nominal", "perturbed"):
-        raise InputError("command line", "--plant", text, "nominal or perturbed")
-    return text
+    if text not in PLANTS:
+        raise InputError("command line", "--plant", text, one_of(PLANTS, text))
+    if text == "mujoco":
+        from quasilpv.experiments.mujoco_plant import require_mujoco
+
+        require_mujoco("--plant mujoco")
+        for experiment in experiments:
+            if not experiment.robot.in_space:
+                expected = f"nominal or perturbed: {experiment.robot.id} moves in a plane"
+                raise InputError("command line", "--plant", text, expected)
+    return cast("PlantKind", text)
 
 
 def formats_of(names: Sequence[str] | None) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -105,7 +105,6 @@ def track_command(
     """
     from quasilpv.cli.results import print_results, print_warnings
     from quasilpv.cli.session import Session, draw_results
-    from quasilpv.experiments.setup import PlantKind
     from quasilpv.scenarios import TrackingExperiment, tracking_experiment
 
     formats = formats_of(figure_formats)
@@ -124,7 +123,7 @@ def track_command(
         )
         for experiment in experiments
     ]
-    session = Session(given, rate_hz, cast(PlantKind, plant_kind(plant)), out, log)
+    session = Session(given, rate_hz, plant_kind(plant, experiments), out, log)
     results = run_all(session, planned)
     if not json if figures is None else figures:
         draw_results(results, out, formats)

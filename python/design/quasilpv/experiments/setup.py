@@ -9,7 +9,7 @@ from quasilpv.artifact import Artifact
 from quasilpv.experiments.result import Variant
 from quasilpv.scenarios import Sensors, TrackingExperiment
 
-PlantKind: TypeAlias = Literal["nominal", "perturbed"]
+PlantKind: TypeAlias = Literal["nominal", "perturbed", "mujoco"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +19,7 @@ class RunSetup:
     Attributes:
         experiment: what is tracked.
         artifact: the controller.
-        plant: the true plant, the nominal robot or that with its full payload.
+        plant: the true plant, the nominal robot or that with its full payload; the latter also moved by MuJoCo.
         sensors: encoders and speed noise.
         transport_delay_s: from a sample to the moment its torque acts.
         variant: what to call the controller; by default its law kind, which several controllers share.

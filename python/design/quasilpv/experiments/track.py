@@ -17,10 +17,12 @@ from quasilpv.documents.robot import read_mechanism
 from quasilpv.errors import InputError
 from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.metrics import compute_metrics
+from quasilpv.experiments.mujoco_plant import MujocoPlant
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.run import Run
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.scenarios import (
+    MujocoIntegrator,
     Sensors,
     TrackingExperiment,
     build_scenario,
@@ -132,15 +134,32 @@ def track(setup: RunSetup, folder: Path) -> TrackResult:
         PlantError: the plant could not be integrated.
     """
     files = write_run_files(folder, setup)
-    # As bytes: a name need not be text.
-    columns = _runtime.run_closed_loop(
-        _runtime.Artifact.load(os.fsencode(files.artifact)),
-        _runtime.Trajectory.load(os.fsencode(files.trajectory)),
-        _runtime.Scenario.load(os.fsencode(files.scenario)),
-    )
+    columns = closed_loop(files)
     if setup.log:
         write_run(folder / LOG_NAME, run_documents("in-process", files, setup), columns)
     return summarise(run_from_columns(columns, setup.artifact.joints, setup.artifact.sample_period_s), setup)
+
+
+def closed_loop(files: RunFiles) -> dict[str, FloatArray]:
+    """The columns of a run, by name: (N,) or (N, n).
+
+    Raises:
+        InputError: a file cannot be read, they do not fit each other, or MuJoCo is asked for and not installed.
+        PlantError: the plant could not be integrated.
+    """
+    # As bytes: a name need not be text.
+    artifact = _runtime.Artifact.load(os.fsencode(files.artifact))
+    loaded = (
+        artifact,
+        _runtime.Trajectory.load(os.fsencode(files.trajectory)),
+        _runtime.Scenario.load(os.fsencode(files.scenario)),
+    )
+    scenario = read_scenario(files.scenario)
+    if not isinstance(scenario.integrator, MujocoIntegrator):
+        return _runtime.run_closed_loop(*loaded)
+    plant = MujocoPlant(scenario, artifact.sample_period_s)
+    with plant.running():
+        return _runtime.run_closed_loop(*loaded, advance=plant.advance)
 
 
 def disturbance_beyond_limits(experiment: TrackingExperiment, artifact: Artifact) -> str | None:

@@ -18,7 +18,7 @@ from quasilpv.documents.canonical import (
     require_bounded,
 )
 from quasilpv.documents.mechanism import MECHANISM_KINDS
-from quasilpv.documents.plants import Plant
+from quasilpv.documents.plants import Plant, TreePlant
 from quasilpv.documents.strict_model import LARGEST_NUMBER, FieldError, NonNegative, Positive, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import read_bytes, write_readable_json
@@ -49,6 +49,16 @@ class Rk4Integrator(StrictModel):
     steps_per_sample: int = Field(default=4, ge=1, le=1_000_000)
 
 
+class MujocoIntegrator(StrictModel):
+    """MuJoCo instead of the equations of this project, for robots in space: its Runge-Kutta method with equal steps.
+
+    It runs in the process of `quasilpv.experiments.track`; the executables refuse it.
+    """
+
+    kind: Literal["mujoco"] = "mujoco"
+    steps_per_sample: int = Field(default=4, ge=1, le=1_000_000)
+
+
 class SineTorque(StrictModel):
     """One term ``amplitude_nm * sin(frequency_rad_s * t + phase_rad)`` on one joint."""
 
@@ -74,9 +84,9 @@ class InitialState(StrictModel):
     speed_rad_s: Vector
 
 
-Integrator = Annotated[IdaIntegrator | Rk4Integrator, Field(discriminator="kind")]
+Integrator = Annotated[IdaIntegrator | Rk4Integrator | MujocoIntegrator, Field(discriminator="kind")]
 
-TAGS = (*MECHANISM_KINDS, "ida", "rk4")
+TAGS = (*MECHANISM_KINDS, "ida", "rk4", "mujoco")
 """The kinds that tell the cases of a union apart."""
 
 
@@ -118,6 +128,8 @@ class Scenario(StrictModel):
     @model_validator(mode="after")
     def _check_joints(self) -> Self:
         joints = self.plant.joints
+        if isinstance(self.integrator, MujocoIntegrator) and not isinstance(self.plant, TreePlant):
+            raise FieldError("integrator.kind", "mujoco", f"ida or rk4 with a plant of kind {self.plant.kind}")
         if self.torque_limit_nm is not None and len(self.torque_limit_nm) != joints:
             raise FieldError("torque_limit_nm", f"{len(self.torque_limit_nm)} entries", str(joints))
         for field in ("angle_rad", "speed_rad_s"):
