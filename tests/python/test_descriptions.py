@@ -166,6 +166,7 @@ def test_the_base_may_stand_otherwise(edited: Edited, orientation: str, down: tu
         (("mass = 1.0", "mass = 0.0"), "payload.mass"),
         (("[-0.02, 0.02], [0.0", "[0.02, -0.02], [0.0"), "payload.com_box"),
         (("links = 0.05", "links = 1.0"), "uncertainty.links"),
+        (('tip_link = "flange"', 'tip_link = "flange"\nlag = [2e-3, 1e-3]'), r"lag: got \[0.002, 0.001\]"),
         (("two_links.urdf", "missing.urdf"), "missing.urdf: file: got No such file"),
         (("[payload]", "[payload"), "file: got .*, expected TOML"),
     ],

@@ -19,7 +19,8 @@ from hypothesis import strategies as st
 from quasilpv.certificate.exact.matrices import rational
 from quasilpv.certificate.exact.polynomials import CircleProduct, critical_values, is_schur, roots_between
 from quasilpv.certificate.exact.rationals import float_at_least, float_at_most, to_float
-from quasilpv.certificate.gate.delay import DelayMargin, StabilityRectangle, delay_margin
+from quasilpv.certificate.gate.delay import DelayMargin, delay_margin
+from quasilpv.certificate.gate.exclusion import StabilityBox
 from quasilpv.certificate.gate.loop import AccelerationLoopData, CharacteristicPolynomial, Controller
 from quasilpv.certificate.gate.margin import InertiaMargin, inertia_margin
 from quasilpv.certificate.gate.proof import growth_rates
@@ -302,10 +303,10 @@ def test_when_the_rectangle_holds_one_crossing_expect_no_proof(at: Fraction, sid
     inner, outer = margin.inner[side], margin.outer[side]
     assert inner is not None
     assert outer is not None
-    rectangle = StabilityRectangle.of(DEFAULT, min(inner, outer), max(inner, outer))
-    assert not rectangle.is_free_of_crossings(delay * rational(longer), budget=1500)
-    apart = StabilityRectangle.of(DEFAULT, fmpq(1), fmpq(2))
-    assert apart.is_free_of_crossings(delay, budget=1500)
+    box = StabilityBox.of(DEFAULT, min(inner, outer), max(inner, outer))
+    assert not box.is_free_of_crossings((fmpq(0), delay * rational(longer)), budget=1500)
+    apart = StabilityBox.of(DEFAULT, fmpq(1), fmpq(2))
+    assert apart.is_free_of_crossings((fmpq(0), delay), budget=1500)
 
 
 def test_when_the_needed_range_does_not_fit_without_delay_expect_no_delay_margin() -> None:

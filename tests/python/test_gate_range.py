@@ -46,6 +46,7 @@ ANSWER = {
     "evidence": str,
     "inertia_margin": list,
     "delay_margin_s": float,
+    "lag_s": list,
     "proved_in_motion": type(None),
     "needed_range": list,
     "sampled_range": list,
@@ -337,7 +338,7 @@ def test_when_a_sound_design_meets_the_gate_expect_it_passed_and_proved(name: st
 def test_when_the_gate_answers_expect_exactly_the_documented_members() -> None:
     answer = gate("arm3").to_document()
     assert {key: type(value) for key, value in answer.items()} == ANSWER
-    assert answer["where"].keys() == {"angle_rad", "payload_fraction", "inertia_ratio", "delay_s"}
+    assert answer["where"].keys() == {"angle_rad", "payload_fraction", "inertia_ratio", "delay_s", "lag_s"}
     json.dumps(answer, allow_nan=False)
 
 

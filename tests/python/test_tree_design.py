@@ -158,10 +158,8 @@ def test_when_there_is_no_integral_action_expect_the_exact_loop_to_have_the_root
     np.testing.assert_allclose(margin.to_floats(), found, rtol=1e-4)
 
 
-def test_when_drives_lag_or_a_controller_is_planar_expect_a_refusal() -> None:
+def test_when_a_controller_is_planar_expect_a_refusal() -> None:
     robot = small_robot()
-    with pytest.raises(InputError, match="lag"):
-        synthesise(DesignRequest.of(replace(robot, lag_s=(0.0, 1e-3))))
     with pytest.raises(InputError, match=r"one for robots in space: .*dob-acceleration"):
         synthesise(DesignRequest.of(robot, "dob-torque"))
 

@@ -49,12 +49,13 @@ def gate(document: Given, source: str = "artifact", delay_samples: fmpq = HALF_A
         delay_samples: the transport delay it has to tolerate, in samples.
 
     Raises:
-        InputError: the law kind has no gate, or the artifact does not fit it.
+        InputError: the law kind has no gate, or none for drives that lag, or the artifact does not fit it.
     """
     own = shipped(document, source)
     found = LAWS[own.law.kind].gate
     if found is None:
         raise _without(own, "gate", "one with this gate")
+    _require_lag_covered(own)
     return found(own, delay_samples)
 
 
@@ -73,11 +74,19 @@ def verify(document: Given, source: str = "artifact") -> Verification:
     checks = LAWS[own.law.kind].checks
     if not checks:
         raise _without(own, "checks", "one with a certificate")
+    _require_lag_covered(own)
     try:
         found = tuple(claim for check in checks for claim in check(own))
     except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise InputError(source, "witness", f"{type(error).__name__}: {error}", f"what {own.law.kind} needs") from error
     return Verification(found, time.perf_counter() - start)
+
+
+def _require_lag_covered(own: Shipped[Any]) -> None:
+    kind = LAWS[own.law.kind]
+    if not kind.covers_lag:
+        known = ", ".join(law.name for law in LAWS.values() if law.covers_lag)
+        own.require_no_lag(f"no member of this name: of drives that lag, {kind.name} claims nothing ({known} does)")
 
 
 def _without(own: Shipped[Any], part: str, expected: str) -> InputError:

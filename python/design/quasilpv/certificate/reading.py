@@ -66,6 +66,11 @@ class Shipped(Generic[LawT]):
         """
         return read_payloads(self.artifact.payloads, self.mechanism, self.source)
 
+    def require_no_lag(self, expected: str) -> None:
+        """Raise InputError if the drives of the set of plants lag."""
+        if self.payloads.drive_lag_s[1] > 0.0:
+            raise InputError(self.source, "payloads.lag_s", list(self.payloads.drive_lag_s), expected)
+
     def program(self, name: str) -> Program:
         """One of its programs.
 

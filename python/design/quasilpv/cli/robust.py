@@ -98,11 +98,12 @@ def _rows(gate: RobustGate) -> list[tuple[str, str]]:
 
     margin = _interval(*gate.margin.to_floats()) if gate.margin else "none"
     needed = _interval(*gate.needed.to_floats()) if gate.needed else "none"
+    lags = f" and {gate.lag_s[1] * 1e3:.3g} ms of lag" if gate.lag[1] > 0 else ""
     rows = [
-        (f"inertia margin with {to_float(gate.specified_delay_samples):g} samples of delay", margin),
+        (f"inertia margin with {to_float(gate.specified_delay_samples):g} samples of delay{lags}", margin),
         ("needed range of M_t/M_n (proved)", needed),
         ("  found at samples", _interval(*gate.sampled_range) if gate.sampled_range else "none"),
-        ("delay margin", _delay(gate)),
+        ("delay margin" + (f" at every lag of {_lags(gate)}" if lags else ""), _delay(gate)),
         (
             "one Lyapunov function for all motions",
             {None: "not claimed", True: "proved", False: "NOT proved"}[gate.motion],
@@ -117,7 +118,14 @@ def _rows(gate: RobustGate) -> list[tuple[str, str]]:
             ("  with payload fraction", f"{place.payload_fraction:.3g} (M_t/M_n {place.inertia_ratio:.4g})"),
             ("  and a delay of", f"{gate.worst.delay_s * 1e3:.3g} ms"),
         ]
+        if lags:
+            rows.append(("  and a lag of", f"{gate.worst.lag_s * 1e3:.3g} ms"))
     return rows
+
+
+def _lags(gate: RobustGate) -> str:
+    low, high = gate.lag_s
+    return f"{low * 1e3:.3g} to {high * 1e3:.3g} ms"
 
 
 def _interval(low: float, high: float | None) -> str:
@@ -136,7 +144,8 @@ def _verdict(gate: RobustGate) -> str:
     if gate.passed and gate.motion:
         return f"passed: proved for every motion, payload and constant delay up to the specified one, {WHILE}"
     if gate.passed:
-        proved = "every posture, payload and constant delay up to the specified one (frozen loop)"
+        lag = f", every lag of the drives of {_lags(gate)}" if gate.lag[1] > 0 else ""
+        proved = f"every posture, payload{lag} and constant delay up to the specified one (frozen loop)"
         return f"passed: proved for {proved}, {WHILE}"
     if gate.margin is None:
         return "NOT passed: with the specified delay the loop is not stable even with the design inertia"

@@ -108,6 +108,14 @@ class RobotFile(StrictModel):
     delay: tuple[NonNegative, NonNegative] | NonNegative = 0.0
     lag: tuple[NonNegative, NonNegative] | NonNegative = 0.0
 
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for name in ("delay", "lag"):
+            low, high = _interval(getattr(self, name))
+            if low > high:
+                raise FieldError(name, [low, high], "a lower bound that is not above the upper bound")
+        return self
+
 
 @dataclass(frozen=True)
 class RobotSource:

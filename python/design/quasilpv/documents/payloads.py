@@ -16,7 +16,27 @@ WHOLE = (0.0, 1.0)
 
 
 class PayloadsDocument(StrictModel):
-    """A set of plants; what it says and no more is what a gate proves."""
+    """A set of plants; what it says and no more is what a gate proves.
+
+    Attributes:
+        lag_s: shortest and longest time constant of the drives, the same for all joints; absent for none.
+    """
+
+    lag_s: Interval | None = None
+
+    @model_validator(mode="after")
+    def _check_lag(self) -> Self:
+        if "lag_s" not in self.model_fields_set:
+            return self
+        if self.lag_s is None or not 0.0 <= self.lag_s[0] <= self.lag_s[1] or self.lag_s[1] == 0.0:
+            got = None if self.lag_s is None else list(self.lag_s)
+            raise FieldError("lag_s", got, "0 <= shortest <= longest, the longest > 0, or no member of this name")
+        return self
+
+    @property
+    def drive_lag_s(self) -> Interval:
+        """Shortest and longest time constant of the drives; (0, 0) for none."""
+        return self.lag_s or (0.0, 0.0)
 
     def require_joints(self, joints: int) -> None:
         """Raise ``FieldError`` unless there is one entry for each joint where there has to be."""

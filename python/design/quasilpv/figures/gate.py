@@ -19,7 +19,7 @@ def gate_figure(found: Gate) -> Figure:
     """What a gate found over the delay: growth rates on the grid, or the proved inertia margin."""
     if isinstance(found, GridGate):
         return growth_figure(found, growth_curves(found))
-    return margin_figure(found, margin_curve(found.loop, _longest_delay(found)))
+    return margin_figure(found, margin_curve(found.loop, _longest_delay(found), lag_samples=found.lag[1]))
 
 
 def _longest_delay(gate: RobustGate) -> fmpq:

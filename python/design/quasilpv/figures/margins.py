@@ -26,7 +26,7 @@ def margin_figure(gate: RobustGate, curve: MarginCurve) -> Figure:
     """
     with style():
         rate = 1.0 / gate.loop.sample_period_s
-        figure = new_figure(3.8, f"Inertia margin of the frozen loop at {rate:g} Hz")
+        figure = new_figure(3.8, f"Inertia margin of the frozen loop at {rate:g} Hz{_lag(gate)}")
         axes = figure.subplots()
         _plot_margin(axes, curve)
         if gate.needed is not None:
@@ -39,6 +39,10 @@ def margin_figure(gate: RobustGate, curve: MarginCurve) -> Figure:
         _label(axes, curve, rate)
         figure.legend(loc="outside lower center", ncols=3, handlelength=2.2)
         return figure
+
+
+def _lag(gate: RobustGate) -> str:
+    return f", drives that lag by {gate.lag_s[1] * 1e3:.3g} ms" if gate.lag[1] > 0 else ""
 
 
 def _plot_margin(axes: Axes, curve: MarginCurve) -> None:

@@ -35,6 +35,22 @@ def is_schur(polynomial: fmpq_poly) -> bool:
     return True
 
 
+def is_schur_enclosed(polynomial: arb_poly) -> bool:
+    """The same for ball coefficients: True is proved for every polynomial in the balls, False says nothing.
+
+    Args:
+        polynomial: its leading coefficient contains no zero.
+    """
+    coefficients = list(polynomial.coeffs())
+    while len(coefficients) > 1:
+        ratio = coefficients[0] / coefficients[-1]
+        if not abs(ratio) < 1:
+            return False
+        reflected = coefficients[::-1]
+        coefficients = [a - ratio * b for a, b in zip(coefficients[1:], reflected[1:], strict=True)]
+    return True
+
+
 @dataclass(frozen=True)
 class CircleProduct:
     """``F(z) conj(G(z))`` for ``z = e^(i phi)``, as polynomials in ``c = cos(phi)``.

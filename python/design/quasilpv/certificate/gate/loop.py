@@ -14,6 +14,12 @@ zero-order-hold plant is ``y = mu N_p / (z^(w+1) zeta^2) a`` with ``g = 1 - f`` 
 
     N_p = 1 + (g + 1/2) zeta + g^2/2 zeta^2.
 
+Where the drives lag, ``s acc' = a - acc`` with ``theta'' = mu acc`` and s in samples, N_p becomes, with ``u = g - s``,
+
+    N = 1 + (u + 1/2) zeta + (u^2 + s^2)/2 zeta^2 - s^2 exp(-g/s) zeta^3 / (zeta + 1 - exp(-1/s)),
+
+by partial fractions of ``1/(p^2 (1 + s p))``. Its exponentials are not rational: they are balls of Arb arithmetic.
+
 Written from the formulas of the law and of the plant, not from the design's own loop: the two are compared by tests.
 """
 
@@ -22,15 +28,22 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from flint import arb, ctx, fmpq, fmpq_poly
+from flint import arb, arb_poly, ctx, fmpq, fmpq_poly
 
 from quasilpv.certificate.exact.matrices import rational
+from quasilpv.certificate.exact.polynomials import is_schur_enclosed
 from quasilpv.errors import InputError
 
 ONE = fmpq_poly([1])
 ZETA = fmpq_poly([0, 1])
 Z = ONE + ZETA
 FORGETTING_BITS = 256
+LAGGING_BITS = 512
+
+Interval = tuple[fmpq, fmpq]
+"""Of delays or lags, in samples."""
+
+NO_LAG: Interval = (fmpq(0), fmpq(0))
 
 
 @dataclass(frozen=True)
@@ -148,3 +161,35 @@ class CharacteristicPolynomial:
         F = controller.denominator * Z ** (whole + 1) * ZETA**2
         G = -controller.numerator * plant
         return cls(F(to_z), G(to_z))
+
+
+@dataclass(frozen=True)
+class LaggingPolynomial:
+    """The same with drives that lag: ``F + mu G``, ball coefficients in ascending powers of zeta; F is monic."""
+
+    F: arb_poly
+    G: arb_poly
+
+    @classmethod
+    def of(cls, controller: Controller, delay_samples: fmpq, lag_samples: fmpq) -> LaggingPolynomial:
+        """``F = D_c z^(w+1) zeta^2 (zeta + 1 - exp(-1/s))``, ``G = -N_c N (zeta + 1 - exp(-1/s))``.
+
+        Args:
+            controller: of one filter pole.
+            delay_samples: w + f >= 0.
+            lag_samples: s > 0.
+        """
+        whole, s = int(delay_samples.floor()), lag_samples
+        early = 1 - (delay_samples - whole)
+        u = early - s
+        with ctx.workprec(LAGGING_BITS):
+            pole = arb_poly([1 - (arb(-1 / s)).exp(), 1])
+            late = arb_poly([0, 0, 0, arb(s**2) * (arb(-early / s)).exp()])
+            plant = arb_poly(fmpq_poly([1, u + fmpq(1, 2), (u**2 + s**2) / 2])) * pole - late
+            F = arb_poly(controller.denominator * Z ** (whole + 1) * ZETA**2) * pole
+            return cls(F, -arb_poly(controller.numerator) * plant)
+
+    def is_schur(self) -> bool:
+        """Whether all roots at ``mu = 1`` are proved to lie inside the unit circle; False where balls are too wide."""
+        with ctx.workprec(LAGGING_BITS):
+            return is_schur_enclosed((self.F + self.G)(arb_poly([-1, 1])))

@@ -4,6 +4,9 @@ The loop is stable at ``rho = M_t / M_n = 1 / mu`` if ``F + mu G`` is Schur. Roo
 does not change, so between two neighbouring critical values (a root on the unit circle) nothing changes: Schur at
 mu = 1, decided by a Jury table in rationals, means Schur up to the nearest critical value on either side, and those are
 isolated roots of one polynomial.
+
+Where the drives lag, coefficients are balls. Then the table of Jury decides in ball arithmetic, critical values are
+found in doubles, and that none lies between them is proved by exclusion (`quasilpv.certificate.gate.exclusion`).
 """
 
 from __future__ import annotations
@@ -11,11 +14,29 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
 from flint import arb, fmpq
 
+from quasilpv.arrays import FloatArray
+from quasilpv.certificate.exact.matrices import rational
 from quasilpv.certificate.exact.polynomials import critical_values, is_schur
 from quasilpv.certificate.exact.rationals import float_at_least, float_at_most
-from quasilpv.certificate.gate.loop import AccelerationLoopData, CharacteristicPolynomial, Controller
+from quasilpv.certificate.gate.exclusion import StabilityBox
+from quasilpv.certificate.gate.loop import (
+    AccelerationLoopData,
+    CharacteristicPolynomial,
+    Controller,
+    LaggingPolynomial,
+)
+
+ZERO = fmpq(0)
+LOWEST_PHASE, PHASES, BISECTIONS = 1e-4, 400, 50
+LARGEST_RATIO = 1e4
+"""Of ratios that are looked at where the drives lag."""
+
+RETREATS = (1e-6, 1e-4, 1e-2)
+"""From a critical ratio found in doubles, relative: the exclusion needs some distance to it."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +49,7 @@ class InertiaMargin:
     Attributes:
         inner: proved (lower, upper); the upper bound is None if every larger ratio is stable.
         outer: (lower, upper) with outer lower <= inner lower and inner upper <= outer upper; 0 if the loop is stable
-            for every smaller ratio, None as above.
+            for every smaller ratio, None as above. Where the drives lag nothing is said: 0 and None.
     """
 
     inner: tuple[fmpq, fmpq | None]
@@ -45,19 +66,62 @@ class InertiaMargin:
         return float_at_least(low), None if high is None else float_at_most(high)
 
 
-def inertia_margin(data: AccelerationLoopData, delay_samples: fmpq) -> InertiaMargin | None:
-    """The proved inertia margin at a constant transport delay; None if the loop is not stable at ``M_t = M_n``.
+def inertia_margin(data: AccelerationLoopData, delay_samples: fmpq, lag_samples: fmpq = ZERO) -> InertiaMargin | None:
+    """The proved inertia margin at a constant delay and lag; None if the loop is not stable at ``M_t = M_n``.
 
     Args:
         data: the law as shipped; the margin holds for both neighbours of its filter pole.
         delay_samples: transport delay in samples, >= 0.
+        lag_samples: time constant of the drives in samples, >= 0.
 
     Raises:
         InputError: the delay is negative.
     """
+    if lag_samples > 0:
+        return _lagging_margin(data, delay_samples, lag_samples)
     margins = [_margin(Controller.of(data, pole), delay_samples) for pole in data.filter_poles()]
     proved = [margin for margin in margins if margin is not None]
     return _intersection(proved) if len(proved) == len(margins) else None
+
+
+def _lagging_margin(data: AccelerationLoopData, delay: fmpq, lag: fmpq) -> InertiaMargin | None:
+    polynomials = [LaggingPolynomial.of(Controller.of(data, pole), delay, lag) for pole in data.filter_poles()]
+    if not all(polynomial.is_schur() for polynomial in polynomials):
+        return None
+    below, above = _critical_ratios(polynomials[0])
+    for retreat in RETREATS:
+        low, high = rational(below * (1.0 + retreat)), rational(above * (1.0 - retreat))
+        box = StabilityBox.of(data, low, high, (lag, lag))
+        if low < 1 < high and box.is_free_of_crossings((delay, delay)):
+            return InertiaMargin((low, high), (ZERO, None))
+    return None
+
+
+def numerical_margin(data: AccelerationLoopData, delay_samples: fmpq, lag_samples: fmpq) -> tuple[float, float] | None:
+    """The inertia margin of drives that lag in doubles: where to look for a proof. None as for `inertia_margin`."""
+    polynomial = LaggingPolynomial.of(Controller.of(data, data.filter_poles()[0]), delay_samples, lag_samples)
+    return _critical_ratios(polynomial) if polynomial.is_schur() else None
+
+
+def _critical_ratios(polynomial: LaggingPolynomial) -> tuple[float, float]:
+    """The critical ratios next to 1, in doubles: where ``-G/F`` is real on the unit circle."""
+    F, G = (np.array([float(c.mid()) for c in part.coeffs()[::-1]]) for part in (polynomial.F, polynomial.G))
+
+    def ratio(phase: FloatArray) -> npt.NDArray[np.complex128]:
+        zeta = np.expm1(1j * phase)
+        return np.asarray(-np.polyval(G, zeta) / np.polyval(F, zeta))
+
+    phases = np.append(np.geomspace(LOWEST_PHASE, np.pi, PHASES, endpoint=False), np.pi)
+    values = ratio(phases).imag
+    at = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    low, high, sign = phases[at], phases[at + 1], np.sign(values[at])
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2.0
+        before = ratio(middle).imag * sign > 0.0
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    found = np.append(ratio((low + high) / 2.0).real, ratio(np.array([np.pi])).real)
+    below, above = found[(found > 0.0) & (found < 1.0)], found[found >= 1.0]
+    return float(np.max(below, initial=1.0 / LARGEST_RATIO)), float(np.min(above, initial=LARGEST_RATIO))
 
 
 def _margin(controller: Controller, delay_samples: fmpq) -> InertiaMargin | None:

@@ -2,9 +2,10 @@
 
 In the coordinates that diagonalise ``M_t^-1 M_n`` (similar to a symmetric positive definite matrix, so its eigenvalues
 mu are real and positive) the frozen sampled loop of n joints is n copies of one scalar loop. It is stable in every
-posture of the operating domain, with every payload and with every constant transport delay up to the specified one,
-if the *needed range* of ``M_t / M_n = 1 / mu`` lies in the *inertia margin* of the scalar loop at all these delays. All
-three are proved in exact or ball arithmetic (``docs/concepts/robust-gate.md`` says what is not).
+posture of the operating domain, with every payload, every constant transport delay up to the specified one and every
+lag of the drives in the interval of the artifact, if the *needed range* of ``M_t / M_n = 1 / mu`` lies in the *inertia
+margin* of the scalar loop at all these delays and lags. All of it is proved in exact or ball arithmetic
+(``docs/concepts/robust-gate.md`` says what is not).
 """
 
 from __future__ import annotations
@@ -19,11 +20,19 @@ from flint import fmpq, fmpq_poly
 
 from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.claims import Evidence
+from quasilpv.certificate.exact.matrices import rational
 from quasilpv.certificate.exact.rationals import float_at_most, to_float
 from quasilpv.certificate.gate.delay import DelayMargin, delay_margin
-from quasilpv.certificate.gate.loop import AccelerationLoopData, CharacteristicPolynomial, Controller
+from quasilpv.certificate.gate.loop import (
+    NO_LAG,
+    AccelerationLoopData,
+    CharacteristicPolynomial,
+    Controller,
+    Interval,
+    LaggingPolynomial,
+)
 from quasilpv.certificate.gate.lyapunov import Bound, is_function_proved
-from quasilpv.certificate.gate.margin import InertiaMargin, inertia_margin
+from quasilpv.certificate.gate.margin import ZERO, InertiaMargin, inertia_margin
 from quasilpv.certificate.gate.motion import MotionDocument, is_proved_in_motion
 from quasilpv.certificate.reading import Shipped, WitnessDocument
 from quasilpv.certificate.robot.data import inertia_data
@@ -44,6 +53,7 @@ class WorstCase:
     growth_rate_per_s: float
     delay_s: float
     place: Place
+    lag_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -53,7 +63,7 @@ class RobustGate:
     Attributes:
         loop: the law as shipped.
         specified_delay_samples: the transport delay the design has to tolerate.
-        margin: inertia margin at that delay; None if the loop is not stable at ``M_t = M_n``.
+        margin: inertia margin at that delay and the longest lag; None if the loop is not stable at ``M_t = M_n``.
         needed: which ratios occur; None if no bounds could be proved.
         delays: up to which delay the needed range is inside; None without a needed range.
         worst: numerical worst case over the needed range; None without one.
@@ -62,6 +72,7 @@ class RobustGate:
         sampled_range: smallest and largest ratio that were found: what no proof can beat. Nothing rests on it.
         seconds_to_find: how long the design took for the storages of the needed range; None if it has none.
         seconds_to_check: how long the proof of the needed range took.
+        lag: shortest and longest time constant of the drives, common to all joints, in samples.
     """
 
     loop: AccelerationLoopData
@@ -74,6 +85,7 @@ class RobustGate:
     sampled_range: tuple[float, float] | None = None
     seconds_to_find: float | None = None
     seconds_to_check: float | None = None
+    lag: Interval = NO_LAG
 
     def __repr__(self) -> str:
         """The verdict in a line."""
@@ -81,7 +93,7 @@ class RobustGate:
 
     @property
     def passed(self) -> bool:
-        """Whether the needed range is proved inside the margin for every constant delay up to the specified one.
+        """Whether the needed range is proved inside the margin for every lag and every delay up to the specified one.
 
         If the artifact claims more, one Lyapunov function for all motions, that must be proved as well.
         """
@@ -103,6 +115,12 @@ class RobustGate:
     def sample_period(self) -> fmpq:
         """T, exactly."""
         return fmpq(*self.loop.sample_period_s.as_integer_ratio())
+
+    @property
+    def lag_s(self) -> tuple[float, float]:
+        """Shortest and longest time constant of the drives."""
+        low, high = (to_float(end * self.sample_period) for end in self.lag)
+        return low, high
 
     @property
     def evidence(self) -> Evidence:
@@ -127,13 +145,16 @@ class RobustGate:
         tells it from a gate that samples.
         """
         worst = self.worst
-        where = None if worst is None else {**_place_document(worst.place), "delay_s": worst.delay_s}
+        where = (
+            None if worst is None else {**_place_document(worst.place), "delay_s": worst.delay_s, "lag_s": worst.lag_s}
+        )
         return {
             "passed": self.passed,
             "proved": self.passed,
             "evidence": self.evidence.value,
             "inertia_margin": None if self.margin is None else list(self.margin.to_floats()),
             "delay_margin_s": self.delay_margin_s,
+            "lag_s": list(self.lag_s),
             "proved_in_motion": self.motion,
             "needed_range": None if self.needed is None else list(self.needed.to_floats()),
             "sampled_range": None if self.sampled_range is None else list(self.sampled_range),
@@ -170,49 +191,66 @@ def robust_gate(
     Raises:
         InputError: a robot the gate does not know, or data that contradict each other.
     """
-    margin = inertia_margin(loop, delay_samples)
+    lag = _lag(shipped, loop)
+    margin = inertia_margin(loop, delay_samples, lag[1])
     if isinstance(shipped.mechanism, Tree):
-        return _tree_gate(shipped, loop, margin, delay_samples)
+        return _tree_gate(shipped, RobustGate(loop, delay_samples, margin, None, None, None, lag=lag))
     began = time.perf_counter()
     inertia = InertiaPair(inertia_data(shipped))
     needed = needed_range(inertia)
     seconds = time.perf_counter() - began
     if needed is None:
-        return RobustGate(loop, delay_samples, margin, None, None, None, seconds_to_check=seconds)
-    delays = delay_margin(loop, needed.lowest, needed.highest)
-    worst = worst_case(loop, inertia, needed, (fmpq(0), delay_samples))
+        return RobustGate(loop, delay_samples, margin, None, None, None, seconds_to_check=seconds, lag=lag)
+    delays = delay_margin(loop, needed.lowest, needed.highest, lag)
+    worst = worst_case(loop, inertia, needed, (fmpq(0), delay_samples), lag)
     motion = _proved_in_motion(shipped, loop, inertia, bound)
+    if motion and lag[1] > 0:
+        motion = False  # the circle criterion knows no lag
     sampled = needed.where_lowest.inertia_ratio, needed.where_highest.inertia_ratio
     return RobustGate(
-        loop, delay_samples, margin, needed, delays, worst, motion, sampled_range=sampled, seconds_to_check=seconds
+        loop,
+        delay_samples,
+        margin,
+        needed,
+        delays,
+        worst,
+        motion,
+        sampled_range=sampled,
+        seconds_to_check=seconds,
+        lag=lag,
     )
 
 
-def _tree_gate(
-    shipped: Shipped[Any], loop: AccelerationLoopData, margin: InertiaMargin | None, delay_samples: fmpq
-) -> RobustGate:
-    """The gate of a robot in space, whose needed range is proved with the storages of its witness."""
+def _lag(shipped: Shipped[Any], loop: AccelerationLoopData) -> Interval:
+    """Shortest and longest lag of the drives, in samples."""
+    period = rational(loop.sample_period_s)
+    low, high = (rational(end) / period for end in shipped.payloads.drive_lag_s)
+    return low, high
+
+
+def _tree_gate(shipped: Shipped[Any], opened: RobustGate) -> RobustGate:
+    """The gate of a robot in space, whose needed range is proved with the storages of its witness.
+
+    Args:
+        shipped: the artifact.
+        opened: the gate with margin and lag.
+    """
     witness = shipped.witness(TreeWitness).chain
     pair = TreePair(TreeData.of(shipped))
     try:
         found = tree_range(pair, witness)
     except ValueError as error:
         raise InputError(shipped.source, "witness.chain", error, "a storage for every joint but the last") from error
-    gate = RobustGate(
-        loop,
-        delay_samples,
-        margin,
-        None,
-        None,
-        None,
+    gate = replace(
+        opened,
         sampled_range=found.sampled,
         seconds_to_find=witness.seconds_to_find,
         seconds_to_check=found.seconds_to_check,
     )
     if found.needed is None:
         return gate
-    delays = delay_margin(loop, found.needed.lowest, found.needed.highest)
-    worst = worst_case(loop, pair, found.needed, (fmpq(0), delay_samples))
+    delays = delay_margin(gate.loop, found.needed.lowest, found.needed.highest, gate.lag)
+    worst = worst_case(gate.loop, pair, found.needed, (fmpq(0), gate.specified_delay_samples), gate.lag)
     return replace(gate, needed=found.needed, delays=delays, worst=worst)
 
 
@@ -243,18 +281,21 @@ class MarginCurve:
     highest: FloatArray
 
 
-def margin_curve(loop: AccelerationLoopData, longest_samples: fmpq, points: int = CURVE_POINTS) -> MarginCurve:
+def margin_curve(
+    loop: AccelerationLoopData, longest_samples: fmpq, points: int = CURVE_POINTS, lag_samples: fmpq = ZERO
+) -> MarginCurve:
     """The inertia margin at equally spaced delays from 0 to the longest.
 
     Args:
         loop: the law as shipped.
         longest_samples: > 0, in samples.
         points: how many, at least 2.
+        lag_samples: time constant of the drives.
     """
     delays = [longest_samples * k / (points - 1) for k in range(points)]
     limits = np.full((points, 2), np.nan)
     for row, delay in enumerate(delays):
-        margin = inertia_margin(loop, delay)
+        margin = inertia_margin(loop, delay, lag_samples)
         if margin is not None:
             low, high = margin.to_floats()
             limits[row] = low, np.inf if high is None else high
@@ -269,34 +310,44 @@ class Places(Protocol):
         """A place one of whose ratios is near a given one."""
 
 
-def worst_case(loop: AccelerationLoopData, inertia: Places, needed: NeededRange, delays: Sequence[fmpq]) -> WorstCase:
-    """Largest ``log(spectral radius) / T`` over a grid of the needed range and some delays, in double arithmetic.
+def worst_case(
+    loop: AccelerationLoopData, inertia: Places, needed: NeededRange, delays: Sequence[fmpq], lags: Sequence[fmpq]
+) -> WorstCase:
+    """Largest ``log(spectral radius) / T`` over a grid of the needed range, delays and lags, in double arithmetic.
 
     Args:
         loop: the law as shipped.
         inertia: where ratios occur.
         needed: the range.
         delays: transport delays in samples.
+        lags: of the drives, in samples.
     """
     ratios = np.geomspace(*needed.to_floats(), GROWTH_RATIOS)
-    rates = {delay: growth_rates(loop, delay, ratios) for delay in delays}
-    delay = max(rates, key=lambda key: float(rates[key].max()))
-    row = int(rates[delay].argmax())
+    rates = {(delay, lag): growth_rates(loop, delay, ratios, lag) for delay in delays for lag in dict.fromkeys(lags)}
+    delay, lag = max(rates, key=lambda key: float(rates[key].max()))
+    row = int(rates[delay, lag].argmax())
     place = min(
         (needed.where_lowest, needed.where_highest, inertia.nearest_place(float(ratios[row]))),
         key=lambda candidate: abs(candidate.inertia_ratio - ratios[row]),
     )
-    return WorstCase(float(rates[delay][row]), to_float(delay) * loop.sample_period_s, place)
+    period = loop.sample_period_s
+    return WorstCase(float(rates[delay, lag][row]), to_float(delay) * period, place, to_float(lag) * period)
 
 
-def growth_rates(loop: AccelerationLoopData, delay_samples: fmpq, ratios: FloatArray) -> FloatArray:
+def growth_rates(
+    loop: AccelerationLoopData, delay_samples: fmpq, ratios: FloatArray, lag_samples: fmpq = ZERO
+) -> FloatArray:
     """``log(largest root) / T`` at each ratio ``M_t / M_n``, 1/s, numerical.
 
     The slow roots are clustered near z = 1: computed as roots in ``zeta = z - 1``, around 0, they keep their digits.
     """
-    polynomial = CharacteristicPolynomial.of(Controller.of(loop, loop.filter_poles()[0]), delay_samples)
-    shift = fmpq_poly([1, 1])
-    F, G = (np.array([to_float(x) for x in part(shift).coeffs()[::-1]]) for part in (polynomial.F, polynomial.G))
+    controller = Controller.of(loop, loop.filter_poles()[0])
+    if lag_samples > 0:
+        lagging = LaggingPolynomial.of(controller, delay_samples, lag_samples)
+        F, G = (np.array([float(x.mid()) for x in part.coeffs()[::-1]]) for part in (lagging.F, lagging.G))
+    else:
+        polynomial, shift = CharacteristicPolynomial.of(controller, delay_samples), fmpq_poly([1, 1])
+        F, G = (np.array([to_float(x) for x in part(shift).coeffs()[::-1]]) for part in (polynomial.F, polynomial.G))
     G = np.concatenate([np.zeros(F.size - G.size), G])
     radius = [np.abs(1.0 + np.roots(F + G / ratio)).max() for ratio in ratios]
     return np.asarray(np.log(radius) / loop.sample_period_s)

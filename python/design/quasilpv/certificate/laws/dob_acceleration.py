@@ -122,6 +122,7 @@ def claims(shipped: Shipped[DobAccelerationLaw]) -> Iterator[Claim]:
     if isinstance(law.inertia, PolytopeTable):
         yield from VertexTable.of(law.inertia).collapse_claim("inertia")
     if witness.envelope is not None:
+        shipped.require_no_lag("an artifact without an operating envelope, which knows no lag")
         yield from sampled_envelope_claims(shipped, loop_data(shipped), witness.envelope)
 
 
@@ -190,4 +191,4 @@ def _quadratic(weight: fmpq_mat, columns: fmpq_mat) -> fmpq:
     return trace(columns.transpose() * weight * columns)
 
 
-LAW = LawKind(DobAccelerationLaw, (claims, check_design_model), gate, Evidence.ENCLOSED)
+LAW = LawKind(DobAccelerationLaw, (claims, check_design_model), gate, Evidence.ENCLOSED, covers_lag=True)

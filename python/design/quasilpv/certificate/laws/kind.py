@@ -33,12 +33,14 @@ class LawKind:
         checks: what it claims, decided: its inequalities, then its design model; none for a law that claims nothing.
         gate: its robust gate: a proof where the loop decouples, a grid elsewhere; None for a law without.
         gate_evidence: what the gate of a released artifact has to rest on; a grid is called one.
+        covers_lag: whether claims and gate hold for drives that lag, or are about others.
     """
 
     document: type[LawDocument]
     checks: tuple[Callable[[Shipped[Any]], Iterable[Claim]], ...] = ()
     gate: GateFunction | None = None
     gate_evidence: Evidence = Evidence.SAMPLED
+    covers_lag: bool = False
 
     @property
     def name(self) -> str:

@@ -7,7 +7,7 @@ diagonalise ``M_t^-1 M_n``, into n copies of one scalar loop
 
 so every question about the robust stability of the frozen loop is a question about the single number ``mu``. The
 controller (estimator, disturbance filter, integral, feedback) is a fixed linear system from theta to a; the plant is
-the exact zero-order-hold double integrator, its command delayed by any time.
+the exact zero-order-hold double integrator, its command delayed by any time, behind drives that may lag.
 
 Inside this module time is counted in samples (T = 1), which keeps every matrix well scaled; arguments and results are
 SI.
@@ -96,13 +96,15 @@ class LinearController:
 
 @dataclass(frozen=True, eq=False)
 class SampledLoop:
-    """One scalar loop: the law against ``theta'' = mu a`` with the command delayed by ``delay_s``.
+    """One scalar loop: the law against ``theta'' = mu b`` with the command delayed by ``delay_s``.
 
-    The state is (theta, theta', the controller's states, the ``floor(delay/T) + 1`` commands still on their way).
+    Here b = a, or ``lag_s b' = a - b``. The state is (theta, theta', b if the drives lag, the controller's states, the
+    ``floor(delay/T) + 1`` commands still on their way).
     """
 
     law: AccelerationLaw
     delay_s: float = 0.0
+    lag_s: float = 0.0
 
     @cached_property
     def _controller(self) -> LinearController:
@@ -119,20 +121,38 @@ class SampledLoop:
         """Per-sample map at ``mu = ratio``, square, time in samples."""
         whole, late = self._delay
         c = self._controller
-        first = 2 + c.order  # of the commands
+        coasting, by_new, by_old = self._plant(ratio, late)
+        moving = len(coasting)
+        first = moving + c.order  # of the commands
         size = first + whole + 1
         command = np.zeros(size)
-        command[0], command[2:first] = c.D, c.C
+        command[0], command[moving:first] = c.D, c.C
         commands = [command, *np.eye(size)[first:]]  # newest first; commands[i] was issued i samples ago
         new, old = commands[whole], commands[whole + 1]
         following = np.zeros((size, size))
-        following[0, 0], following[0, 1], following[1, 1] = 1.0, 1.0, 1.0
-        following[0] += ratio * ((1.0 - late) ** 2 / 2 * new + (late - late**2 / 2) * old)
-        following[1] += ratio * ((1.0 - late) * new + late * old)
-        following[2:first, 0], following[2:first, 2:first] = c.B, c.A
+        following[:moving, :moving] = coasting
+        following[:moving] += np.outer(by_new, new) + np.outer(by_old, old)
+        following[moving:first, 0], following[moving:first, moving:first] = c.B, c.A
         for i in range(whole + 1):
             following[first + i] = commands[i]
         return following
+
+    def _plant(self, ratio: float, late: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """One sample of the plant: its own map, and what the new and the old command do (from and until `late`)."""
+        if self.lag_s == 0.0:
+            new, old = np.array([(1.0 - late) ** 2 / 2, 1.0 - late]), np.array([late - late**2 / 2, late])
+            return np.array([[1.0, 1.0], [0.0, 1.0]]), ratio * new, ratio * old
+        (first, by_old), (then, by_new) = (self._held(ratio, time) for time in (late, 1.0 - late))
+        return then @ first, by_new, then @ by_old
+
+    def _held(self, ratio: float, time: float) -> tuple[FloatArray, FloatArray]:
+        """(theta, theta', b) after some samples of time, and what a constant command adds to it."""
+        s = self.lag_s / self.law.sample_period_s
+        decay = math.exp(-time / s)
+        speed = s * (1.0 - decay)  # of theta, for b = 1 that decays
+        angle = s * (time - speed)
+        free = np.array([[1.0, time, ratio * angle], [0.0, 1.0, ratio * speed], [0.0, 0.0, decay]])
+        return free, np.array([ratio * (time**2 / 2 - angle), ratio * (time - speed), 1.0 - decay])
 
     def growth_rate(self, ratio: float) -> float:
         """Worst growth rate ``log(spectral radius) / T`` at ``mu = ratio``, 1/s; negative when stable."""
@@ -153,11 +173,21 @@ class SampledLoop:
         shift = z - 1.0
         position = (1.0 - late) ** 2 / 2 + (late - late**2 / 2) / z
         speed = (1.0 - late) + late / z
-        plant = (position * shift + speed) / shift**2 / z**whole
+        plant = (position * shift + speed) / shift**2 / z**whole + self._lagging(z, late) / z**whole
         c = self._controller
         system = z[:, None, None] * np.eye(c.order) - c.A
         response = np.linalg.solve(system, np.broadcast_to(c.B, (z.size, c.order))[..., None])[..., 0]
         return np.asarray(plant * (response @ c.C + c.D))
+
+    def _lagging(self, z: ComplexArray, late: float) -> ComplexArray:
+        """What the lag adds to the transfer of the plant: ``1/(p^2 (1 + s p)) - 1/p^2 = s^2/(1 + s p) - s/p``, held."""
+        if self.lag_s == 0.0:
+            return np.zeros_like(z)
+        s, early = self.lag_s / self.law.sample_period_s, 1.0 - late
+        pole, left = math.exp(-1.0 / s), math.exp(-early / s)
+        return np.asarray(
+            s**2 * ((1.0 - left) * z + left - pole) / (z * (z - pole)) - s * (early * z + late) / (z * (z - 1.0))
+        )
 
     def inertia_margin(self) -> tuple[float, float] | None:
         """Largest interval of ``M_t / M_n`` around 1 on which the frozen loop is stable; None if it is not stable at 1.
@@ -184,7 +214,7 @@ class SampledLoop:
         T = self.law.sample_period_s
         A = self.transition(ratio)
         drive = np.zeros(A.shape[0])
-        drive[:2] = ratio / 2, ratio
+        drive[:2] = ratio / 2, ratio  # the disturbance acts on the arm, not through the drives
         z = np.exp(1j * frequency_rad_s * T)
         return float(T**2 * np.abs(np.linalg.solve(z * np.eye(A.shape[0]) - A, drive)[0]))
 
@@ -197,7 +227,7 @@ class SampledLoop:
             return math.inf
         A = self.transition(ratio)
         noise = A[:, 0] - np.eye(A.shape[0])[0]  # the noise enters the controller, not the plant
-        newest = 2 + self._controller.order
+        newest = len(A) - 1 - self._delay[0]
         increment = A[newest].copy()
         increment[newest] -= 1.0
         covariance, power = np.outer(noise, noise), A

@@ -80,6 +80,7 @@ class BandwidthSearch:
         noise: what an encoder's rounding, rad, makes of a unit of the command's activity at s = 1, in the same unit.
         unit: of torque increments.
         integral: whether the feedback has integral action.
+        lag_s: time constant of the drives that gain and activity are evaluated with.
     """
 
     robot_id: str
@@ -90,6 +91,7 @@ class BandwidthSearch:
     noise: float
     unit: str = "N m rms"
     integral: bool = True
+    lag_s: float = 0.0
     feedback: dict[float, ChainGains] = field(default_factory=dict)
     observer: dict[float, ChainGains] = field(default_factory=dict)
     tried: int = 0
@@ -128,7 +130,7 @@ class BandwidthSearch:
         if found.scales is None:
             return
         smallest, largest = found.scales
-        loop = SampledLoop(law)
+        loop = SampledLoop(law, lag_s=self.lag_s)
         for scale in (smallest, math.sqrt(smallest * largest), largest):
             needed = (self.needed.lowest / scale, self.needed.highest / scale)
             ratios = [1.0 / r for r in np.geomspace(*needed, INTERIOR_RATIOS)]
@@ -180,11 +182,14 @@ class BandwidthSearch:
         )
 
 
-def growth_rates(candidate: Candidate, specification: Specification) -> dict[str, tuple[float, float]]:
+def growth_rates(
+    candidate: Candidate, specification: Specification, lag_s: float = 0.0
+) -> dict[str, tuple[float, float]]:
     """Worst growth rate and where, without and with the specified delay."""
     delays = {"no_delay": 0.0, "specified_delay": specification.delay_s}
     return {
-        name: SampledLoop(candidate.law, d).worst_growth_rate(*candidate.needed_range) for name, d in delays.items()
+        name: SampledLoop(candidate.law, d, lag_s).worst_growth_rate(*candidate.needed_range)
+        for name, d in delays.items()
     }
 
 

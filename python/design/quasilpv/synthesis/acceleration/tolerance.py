@@ -68,10 +68,12 @@ class FrozenTolerance:
     Attributes:
         specification: delay and spare.
         needed: range of ``M_t / M_nominal``.
+        lag_s: shortest and longest time constant of the drives.
     """
 
     specification: Specification
     needed: Range
+    lag_s: tuple[float, float] = (0.0, 0.0)
 
     @property
     def span(self) -> float:
@@ -80,9 +82,13 @@ class FrozenTolerance:
 
     def tolerated(self, law: AccelerationLaw) -> Tolerated | None:
         """See `Tolerance`."""
-        margin = SampledLoop(law, self.specification.delay_s).inertia_margin()
-        if margin is None or margin[0] == 0.0:
+        margins = [
+            SampledLoop(law, self.specification.delay_s, lag).inertia_margin() for lag in dict.fromkeys(self.lag_s)
+        ]
+        found = [margin for margin in margins if margin is not None and margin[0] > 0.0]
+        if len(found) < len(margins):
             return None
+        margin = max(low for low, _ in found), min(high for _, high in found)
         spare = self.specification.margin_spare
         smallest, largest = self.needed.highest * spare / margin[1], self.needed.lowest / (margin[0] * spare)
         return Tolerated(margin, margin[1] / margin[0], (smallest, largest) if smallest <= largest else None)

@@ -18,7 +18,6 @@ import numpy as np
 
 from quasilpv.certificate.laws.dob_acceleration import DobAccelerationLaw
 from quasilpv.conditions.tracking.sampled_chains import ChainGains
-from quasilpv.errors import InputError
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.search import BandwidthSearch, Candidate, Grid, growth_rates
 from quasilpv.synthesis.acceleration.tolerance import FrozenTolerance
@@ -60,21 +59,20 @@ def tree_acceleration_law(
         progress: called with (points done, points in all).
 
     Raises:
-        InputError: the drives of the robot lag.
         InfeasibleError: no bounds of the inertia were found, or no design meets the specification.
     """
-    _require_delay_only(robot)
     found = find_range(robot, robot.tree)
     needed = _Range(found.lowest.bound, found.highest.bound)
     search = BandwidthSearch(
         robot.id,
         specification,
         needed,
-        FrozenTolerance(specification, needed),
+        FrozenTolerance(specification, needed, robot.lag_s),
         activity_bound=specification.torque_activity,
         noise=specification.angle_noise_rad * largest_row(robot),
         unit="of a joint's torque limit, rms",
         integral=not robot.rubs,
+        lag_s=robot.lag_s[1],
     )
     best = search.run(GRID, progress)
     feedback, observer = search.gains_of_best()
@@ -93,7 +91,7 @@ def tree_acceleration_law(
         },
         expressions={},
         inputs={"controller": DobAccelerationLaw.tag(), "specification": specification.to_document()},
-        report=_report(best, specification, found, search.tried),
+        report=_report(best, specification, found, search.tried, robot.lag_s[1]),
         witness=_witness(best, feedback, observer, found),
     )
 
@@ -125,15 +123,11 @@ def largest_row(robot: SpatialRobot) -> float:
     return float((np.linalg.norm(inertia, axis=2) / np.array(robot.limits.torque_nm)).max())
 
 
-def _require_delay_only(robot: SpatialRobot) -> None:
-    if robot.lag_s[1] > 0.0:
-        expected = "0: the robust gate covers every transport delay up to one, but no lag of the drives"
-        raise InputError(robot.source, "lag", list(robot.lag_s), expected)
-
-
-def _report(best: Candidate, specification: Specification, found: ChainRange, tried: int) -> dict[str, Any]:
+def _report(
+    best: Candidate, specification: Specification, found: ChainRange, tried: int, lag_s: float
+) -> dict[str, Any]:
     """The numbers a person asks for, JSON-able."""
-    rates = growth_rates(best, specification)
+    rates = growth_rates(best, specification, lag_s)
     worst, where = max(rates.values())
     return {
         "feedback_bandwidth_rad_s": best.bandwidths[0],

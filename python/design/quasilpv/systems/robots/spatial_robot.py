@@ -95,12 +95,14 @@ class SpatialPlants:
         rotor_tolerance: the same of every rotor.
         load: what the tool may carry; None for nothing.
         tool: placement of the load's frame in that of the last joint.
+        lag_s: shortest and longest time constant of the drives, common to all joints.
     """
 
     link_tolerance: float
     rotor_tolerance: tuple[float, ...]
     load: PayloadBody | None
     tool: Placement
+    lag_s: Interval = (0.0, 0.0)
 
     def to_document(self) -> dict[str, Any]:
         """The ``payloads`` member of an artifact."""
@@ -117,6 +119,7 @@ class SpatialPlants:
                 "com_box_m": [list(interval) for interval in load.com_box_m],
                 "inertia_kg_m2": list(load.inertia_kg_m2),
             },
+            **({"lag_s": list(self.lag_s)} if self.lag_s[1] > 0.0 else {}),
         }
 
 
@@ -184,7 +187,7 @@ class SpatialRobot:
     def payloads(self) -> SpatialPlants:
         """The robots a design must cover."""
         rotors = tuple(joint.rotor_tolerance for joint in self.joints)
-        return SpatialPlants(self.link_uncertainty, rotors, self.payload, self.tree.tool)
+        return SpatialPlants(self.link_uncertainty, rotors, self.payload, self.tree.tool, self.lag_s)
 
     def with_payload_fraction(self, fraction: float) -> TreeMechanism:
         """The nominal robot with a share of its load in [0, 1], far out: see `PayloadBody.farthest`.
