@@ -125,6 +125,12 @@ FailsafeFlags refused(std::int64_t count) {
   return flags;
 }
 
+FailsafeFlags outside_proof(std::int64_t count) {
+  FailsafeFlags flags;
+  flags.consecutive_outside = count;
+  return flags;
+}
+
 // The sample that leaves the box is the first of the time outside, and one sample is one millisecond.
 FailsafeFlags outside_from_the_first_sample(std::int64_t /*count*/) {
   FailsafeFlags flags;
@@ -138,6 +144,7 @@ INSTANTIATE_TEST_SUITE_P(Failsafe, EveryLimit,
                                            Limit{"foreign", foreign, 100, FaultCause::kForeignMessages},
                                            Limit{"implausible", implausible, 20, FaultCause::kMeasurementImplausible},
                                            Limit{"speeds", speeds, 20, FaultCause::kSpeedBeyondDomain},
+                                           Limit{"outside", outside_proof, 20, FaultCause::kOutsideProof},
                                            Limit{"start", refused, 1, FaultCause::kStartRefused},
                                            Limit{"premise", outside_from_the_first_sample, 1001,
                                                  FaultCause::kPremiseOutsideBox}),

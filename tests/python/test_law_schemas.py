@@ -10,7 +10,7 @@ from quasilpv import _runtime
 from quasilpv.certificate import LAWS
 from quasilpv.documents.design_inertia import DesignInertia
 from quasilpv.documents.strict_model import NonNegative, Number, Positive, StrictModel
-from quasilpv.documents.tables import Matrix, PolytopeTable, Vector
+from quasilpv.documents.tables import Intervals, Matrix, PolytopeTable, Vector
 
 ROOT = Path(__file__).parents[2]
 REGISTRY = Path("cpp/controller/src/laws/registry.cpp")
@@ -23,6 +23,7 @@ NAMES_OF_TYPES: list[tuple[Any, str]] = [
     (int, "integer"),
     (tuple[Number, Number, Number, Number], "numbers"),
     (Vector, "joint-values"),
+    (Intervals, "intervals"),
     (Matrix, "matrix"),
     (tuple[Matrix, ...], "matrices"),
     (PolytopeTable, "polytope"),

@@ -33,22 +33,6 @@ std::string hex_digits(const Field& field, std::size_t count) {
   return text;
 }
 
-std::array<Interval, kMaxJoints> intervals(const Field& field, int joints) {
-  if (field.size() != static_cast<std::size_t>(joints)) {
-    field.fail("an array of " + std::to_string(field.size()), std::to_string(joints) + " intervals, one per joint");
-  }
-  std::array<Interval, kMaxJoints> result{};
-  for (std::size_t j = 0; j < field.size(); ++j) {
-    const std::vector<double> bounds = field.at(j).numbers(2);
-    if (bounds[0] >= bounds[1]) {
-      field.at(j).fail("[" + canonical_number(bounds[0]) + ", " + canonical_number(bounds[1]) + "]",
-                       "a lower bound below the upper bound");
-    }
-    result[j] = {bounds[0], bounds[1]};
-  }
-  return result;
-}
-
 }  // namespace
 
 Artifact Artifact::load(const std::string& path) { return parse(read_file(path), path); }
@@ -92,8 +76,8 @@ void Artifact::parse_header(const Field& root) {
 void Artifact::parse_limits(const Field& root) {
   const Field domain = root["domain"];
   domain.only({"angle_rad", "speed_rad_s"});
-  domain_.angle_rad = intervals(domain["angle_rad"], joints_);
-  domain_.speed_rad_s = intervals(domain["speed_rad_s"], joints_);
+  domain_.angle_rad = read_intervals(domain["angle_rad"], joints_);
+  domain_.speed_rad_s = read_intervals(domain["speed_rad_s"], joints_);
   const Field limits = root["limits"];
   limits.only({"torque_nm", "slew_nm_per_s"});
   const auto torque = [](const Field& field) { return field.positive(1.0 / kLargestTorqueNm, kLargestTorqueNm); };

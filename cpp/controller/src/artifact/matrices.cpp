@@ -3,6 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <nlohmann/json.hpp>
 
+#include "document/document.hpp"
+
 namespace quasilpv {
 namespace {
 
@@ -49,6 +51,22 @@ std::shared_ptr<const TreeDynamics> read_design_tree(const Field& field, int joi
     tree.gravity_load = read_gravity_load(*load);
   }
   return std::make_shared<const TreeDynamics>(tree);
+}
+
+std::array<Interval, kMaxJoints> read_intervals(const Field& field, int joints) {
+  if (field.size() != static_cast<std::size_t>(joints)) {
+    field.fail("an array of " + std::to_string(field.size()), std::to_string(joints) + " intervals, one per joint");
+  }
+  std::array<Interval, kMaxJoints> result{};
+  for (std::size_t j = 0; j < field.size(); ++j) {
+    const std::vector<double> bounds = field.at(j).numbers(2);
+    if (bounds[0] >= bounds[1]) {
+      field.at(j).fail("[" + canonical_number(bounds[0]) + ", " + canonical_number(bounds[1]) + "]",
+                       "a lower bound below the upper bound");
+    }
+    result[j] = {bounds[0], bounds[1]};
+  }
+  return result;
 }
 
 Eigen::MatrixXd read_lyapunov(const Field& field, int size) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <memory>
 #include <string>
 
@@ -24,6 +25,9 @@ Eigen::MatrixXd read_lyapunov(const Field& field, int size);
 
 /// P of size x size by vertices, each symmetric and positive definite. Throws InputError.
 BlockPolytope read_lyapunov_polytope(const Field& field, int size);
+
+/// One interval per joint, the lower bound below the upper one. Throws InputError.
+std::array<Interval, kMaxJoints> read_intervals(const Field& field, int joints);
 
 /// One value per joint, each read by `read`. Throws InputError.
 template <class Read>

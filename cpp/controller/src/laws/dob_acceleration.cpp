@@ -17,8 +17,10 @@ struct DobAccelerationParameters final : ObserverParameters {
   std::array<double, 4> observer{};      ///< l1 (1), l2 (1/s), l3 (1/s^2), l4 (1/s^3)
   bool disturbance_compensation = true;  ///< false: observed and predicted, but not subtracted
   std::optional<LyapunovBound> bound;    ///< none: not designed for one
+  std::optional<MotionLimits> limits;    ///< none: the proof does not depend on the motion
 
   const LyapunovBound* lyapunov_bound() const noexcept override { return bound ? &*bound : nullptr; }
+  const MotionLimits* motion_limits() const noexcept override { return limits ? &*limits : nullptr; }
   std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
 };
 
@@ -111,6 +113,17 @@ MemberTable<LyapunovBound> bound_table() {
   return bound;
 }
 
+MemberTable<MotionLimits> limits_table() {
+  MemberTable<MotionLimits> limits;
+  limits.add({"angle_rad", "intervals"}, [](const Field& field, int joints, MotionLimits& target) {
+    target.angle_rad = read_intervals(field, joints);
+  });
+  limits.add({"speed_rad_s", "joint-values"}, [](const Field& field, int joints, MotionLimits& target) {
+    target.speed_rad_s = read_joint_values(field, joints, [](const Field& value) { return value.positive(); });
+  });
+  return limits;
+}
+
 // The innovation is read off the corrected estimate, y - th = (1 - l1) (y - predicted angle).
 void read_innovation_share(const Field& law, DobAccelerationParameters& parameters) {
   if (!parameters.bound) {
@@ -134,6 +147,7 @@ LawKind dob_acceleration() {
   law.positive("filter_time_constant_s", &P::filter_time_constant_s);
   law.boolean("disturbance_compensation", &P::disturbance_compensation);
   law.object("lyapunov_bound", &P::bound, bound_table());
+  law.object("motion_limits", &P::limits, limits_table());
   law.finish(read_innovation_share);
   return law.kind();
 }

@@ -24,6 +24,9 @@ FaultCause fault_cause(const FailsafeSettings& settings, const FailsafeFlags& fl
   if (flags.consecutive_speeds >= settings.speed_limit) {
     return FaultCause::kSpeedBeyondDomain;
   }
+  if (flags.consecutive_outside >= settings.outside_limit) {
+    return FaultCause::kOutsideProof;
+  }
   if (flags.consecutive_overruns > settings.overrun_limit) {
     return FaultCause::kDeadlineOverrun;
   }
@@ -82,6 +85,8 @@ const char* to_string(FaultCause cause) noexcept {
       return "speed beyond the domain";
     case FaultCause::kStartRefused:
       return "start refused";
+    case FaultCause::kOutsideProof:
+      return "outside the limits of the proof";
   }
   return "unknown";
 }
@@ -104,8 +109,8 @@ FailsafeState next_state(const FailsafeSettings& settings, const FailsafeState& 
     return next;
   }
   const bool degraded = flags.consecutive_invalid > 0 || flags.consecutive_speeds > 0 ||
-                        flags.consecutive_overruns > 0 || flags.consecutive_foreign > 0 || flags.law_invalid ||
-                        outside_ns > settings.premise_degraded_ns;
+                        flags.consecutive_outside > 0 || flags.consecutive_overruns > 0 ||
+                        flags.consecutive_foreign > 0 || flags.law_invalid || outside_ns > settings.premise_degraded_ns;
   next.state = degraded ? ControllerState::kDegraded : ControllerState::kRunning;
   return next;
 }

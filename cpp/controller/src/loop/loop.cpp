@@ -27,6 +27,7 @@ ControlLoop::ControlLoop(const Artifact& artifact, const Trajectory& trajectory,
       safe_torque_(artifact, settings.safe_action),
       monitor_(artifact),
       plausibility_(artifact),
+      proved_limits_(artifact),
       joining_(artifact),
       bumpless_(settings.bumpless_start) {
   if (trajectory.joints() != artifact.joints()) {
@@ -182,6 +183,9 @@ void ControlLoop::note_measurement(const StepInput& input, StepReport& report) n
   const bool too_fast = plausibility_.is_beyond_domain(report.estimated_speed);
   report.flags |= too_fast ? kSpeedBeyondDomain : kStepHealthy;
   consecutive_speeds_ = too_fast ? consecutive_speeds_ + 1 : 0;
+  const bool outside = proved_limits_.is_outside(input.angle, report.estimated_speed);
+  report.flags |= outside ? kOutsideProof : kStepHealthy;
+  consecutive_outside_ = outside ? consecutive_outside_ + 1 : 0;
 }
 
 void ControlLoop::judge(const StepReport& report, const SampleConditions& conditions, bool plant_silent) noexcept {
@@ -196,6 +200,7 @@ void ControlLoop::judge(const StepReport& report, const SampleConditions& condit
   observed.demanded = conditions.demanded;
   observed.measurement_implausible = implausible_;
   observed.consecutive_speeds = consecutive_speeds_;
+  observed.consecutive_outside = consecutive_outside_;
   observed_ = observed;
   const bool was_fault = failsafe_.state == ControllerState::kFault;
   failsafe_ = next_state(settings_.failsafe, failsafe_, observed, conditions.now_ns);

@@ -36,7 +36,8 @@ Plausibility::Plausibility(const Artifact& artifact)
     : joints_(static_cast<std::size_t>(artifact.joints())),
       sample_period_s_(artifact.sample_period_s()),
       reads_speed_(artifact.law().reads_speed()),
-      domain_(artifact.domain()) {
+      domain_(artifact.domain()),
+      proved_limits_(artifact) {
   for (std::size_t j = 0; j < joints_; ++j) {
     fastest_[j] = kSpeedFactor * domain_.fastest(j);
   }
@@ -51,7 +52,9 @@ std::optional<StartRefusal> Plausibility::refuse_start(const JointArray& angle,
                                                        const JointArray& reference) const noexcept {
   for (std::size_t j = 0; j < joints_; ++j) {
     const bool bounded = has_domain(j);
-    const Interval expected = bounded ? domain_.angle_rad[j] : around(reference[j], kLargestStartDistance);
+    Interval expected = bounded ? domain_.angle_rad[j] : around(reference[j], kLargestStartDistance);
+    expected.low = std::max(expected.low, proved_limits_.angles(j).low);
+    expected.high = std::min(expected.high, proved_limits_.angles(j).high);
     if (!is_within(angle[j], expected)) {
       return StartRefusal{static_cast<int>(j), angle[j], expected, !bounded};
     }

@@ -108,6 +108,7 @@ def _rows(gate: RobustGate) -> list[tuple[str, str]]:
             "one Lyapunov function for all motions",
             {None: "not claimed", True: "proved", False: "NOT proved"}[gate.motion],
         ),
+        *_condition(gate),
     ]
     if gate.worst is not None:
         place = gate.worst.place
@@ -121,6 +122,18 @@ def _rows(gate: RobustGate) -> list[tuple[str, str]]:
         if lags:
             rows.append(("  and a lag of", f"{gate.worst.lag_s * 1e3:.3g} ms"))
     return rows
+
+
+def _condition(gate: RobustGate) -> list[tuple[str, str]]:
+    """Within which motions, if not for all."""
+    if gate.condition is None:
+        return []
+    limits = gate.condition.limits
+    return [
+        ("  for angles in", ", ".join(_interval(*interval) for interval in limits.angle_rad) + " rad"),
+        ("  and speeds up to", ", ".join(f"{speed:.3g}" for speed in limits.speed_rad_s) + " rad/s"),
+        ("  rate of the inertia", f"at most {gate.condition.rate_per_s:.3g} 1/s"),
+    ]
 
 
 def _lags(gate: RobustGate) -> str:
@@ -142,7 +155,8 @@ def _verdict(gate: RobustGate) -> str:
     if gate.motion is False:
         return "NOT passed: that one Lyapunov function is common to all motions is claimed and not proved"
     if gate.passed and gate.motion:
-        return f"passed: proved for every motion, payload and constant delay up to the specified one, {WHILE}"
+        within = "" if gate.condition is None else " within these angles and speeds"
+        return f"passed: proved for every motion{within}, payload and constant delay up to the specified one, {WHILE}"
     if gate.passed:
         lag = f", every lag of the drives of {_lags(gate)}" if gate.lag[1] > 0 else ""
         proved = f"every posture, payload{lag} and constant delay up to the specified one (frozen loop)"

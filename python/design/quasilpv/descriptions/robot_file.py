@@ -63,11 +63,15 @@ class Joint(StrictModel):
     encoder_bits: int | None = Field(default=None, ge=8, le=32)
     friction_viscous: NonNegative = 0.0
     friction_coulomb: NonNegative = 0.0
+    motion_angle: Interval | None = None
+    motion_speed: Positive | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.angle is not None and not self.angle[0] < self.angle[1]:
             raise FieldError("angle", list(self.angle), "a lower bound below the upper bound")
+        if self.motion_angle is not None and not self.motion_angle[0] < self.motion_angle[1]:
+            raise FieldError("motion_angle", list(self.motion_angle), "a lower bound below the upper bound")
         return self
 
 
@@ -225,9 +229,11 @@ def _joint(source: str, described: DescribedJoint, stated: Joint) -> SpatialJoin
         raise InputError(source, f"{place}.rigid", "false", expected)
     torque = required("torque", stated.torque, described.torque, "the largest torque of the drive, N m")
     speed = required("speed", stated.speed, described.speed, "the largest speed of the joint, rad/s")
+    angle = _angles(source, place, described, stated)
+    _check_motion(source, place, stated, angle, speed)
     return SpatialJoint(
         name=described.name,
-        angle_rad=_angles(source, place, described, stated),
+        angle_rad=angle,
         speed_rad_s=speed,
         torque_nm=torque,
         slew_nm_per_s=stated.slew if stated.slew is not None else inf,
@@ -236,7 +242,19 @@ def _joint(source: str, described: DescribedJoint, stated: Joint) -> SpatialJoin
         encoder_bits=stated.encoder_bits,
         friction_viscous_nm_s=stated.friction_viscous,
         friction_coulomb_nm=stated.friction_coulomb,
+        motion_angle_rad=stated.motion_angle,
+        motion_speed_rad_s=stated.motion_speed,
     )
+
+
+def _check_motion(source: str, place: str, stated: Joint, angle: Interval, speed: float) -> None:
+    """The motions a proof holds for are among those the joint can make."""
+    motion = stated.motion_angle
+    if motion is not None and not angle[0] <= motion[0] < motion[1] <= angle[1]:
+        expected = f"an interval inside the joint's [{angle[0]:g}, {angle[1]:g}]"
+        raise InputError(source, f"{place}.motion_angle", list(motion), expected)
+    if stated.motion_speed is not None and stated.motion_speed > speed:
+        raise InputError(source, f"{place}.motion_speed", stated.motion_speed, f"at most the joint's {speed:g}")
 
 
 def _angles(source: str, place: str, described: DescribedJoint, stated: Joint) -> Interval:

@@ -16,6 +16,7 @@ ROUNDING = 1e-12
 
 Vector = tuple[Number, ...]
 Matrix = tuple[Vector, ...]
+Intervals = tuple[tuple[Number, Number], ...]
 
 
 class BoxBlock(StrictModel):

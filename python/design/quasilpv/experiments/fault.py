@@ -26,6 +26,7 @@ NUMBERS = {
     "second plant": "F22",
     "second controller": "F22",
     "commands refused": "F25",
+    "outside the limits": "F27",
 }
 """Which fault of ``docs/reference/faults.md`` a cause is, by the beginning of its words."""
 

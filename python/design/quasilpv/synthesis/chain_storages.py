@@ -15,27 +15,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi
 from typing import Literal, TypeAlias
 
-import clarabel
 import numpy as np
-from scipy import sparse
 
 from quasilpv.arrays import FloatArray
+from quasilpv.synthesis.chain_blocks import coordinates_of, minimise, rounded, symmetric_basis, twist_scales
 from quasilpv.systems.robots.tree import KinematicTree
 
 Side: TypeAlias = Literal["lowest", "highest"]
 
 ANGLES_PER_TURN = 16
-FEWEST_ANGLES = 9
 DENSE_ANGLES = 400
 SPARE = 0.003
 """How far beyond the best bound of the samples the proof is asked for, relative."""
 
 ROUNDS = 8
-STORAGE_BITS = 24
-"""Storages are rounded to multiples of 2^-24 of their own scale."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,21 +84,10 @@ class ChainProgram:
         self._joints = pairing.tree.joints
         n = len(self._joints)
         self._sizes = [1 if k == 0 else 6 for k in range(n - 1)]
-        self._scales = self._twist_scales()
-        self._samples = [_coordinates(joint.lower, joint.upper, ANGLES_PER_TURN) for joint in self._joints]
+        self._scales = twist_scales(self._joints, self.pairing.design)
+        self._samples = [coordinates_of(joint.lower, joint.upper, ANGLES_PER_TURN) for joint in self._joints]
 
     # ---- the inequalities ------------------------------------------------------------------------------------------
-
-    def _twist_scales(self) -> list[FloatArray]:
-        """For every body, one over the square roots of the diagonal of the design inertia it carries, (6,)."""
-        carried = np.zeros((6, 6))
-        scales = []
-        for joint, body in zip(reversed(self._joints), reversed(list(self.pairing.design)), strict=True):
-            carried = carried + body
-            scales.append(1.0 / np.sqrt(np.maximum(carried.diagonal(), 1e-9 * carried.diagonal().max())))
-            X = joint.motion_matrices(np.array(0.0))
-            carried = X.T @ carried @ X
-        return scales[::-1]
 
     def blocks(self, k: int, coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The inequality of joint k (from 0) at coordinates (N,), for every choice of the body.
@@ -136,7 +120,7 @@ class ChainProgram:
         slope = np.zeros((len(T), self.unknowns, size, size))
         slope[:, 0] = self._sign * design
         if k > 0:
-            basis = _symmetric_basis(self._sizes[k - 1])
+            basis = symmetric_basis(self._sizes[k - 1])
             slope[:, self._places(k - 1), : size - 1, : size - 1] = -basis
         if k < len(self._sizes):
             if k == 0:
@@ -144,7 +128,7 @@ class ChainProgram:
             else:
                 inverse = np.diag(1.0 / self._scales[k])
                 own = inverse @ T
-                slope[:, self._places(k)] = np.einsum("nai,uab,nbj->nuij", own, _symmetric_basis(6), own, optimize=True)
+                slope[:, self._places(k)] = np.einsum("nai,uab,nbj->nuij", own, symmetric_basis(6), own, optimize=True)
         return -self._sign * true, np.concatenate([slope] * copies)
 
     def _first_inertia(self) -> float:
@@ -174,7 +158,7 @@ class ChainProgram:
         """The best c on the samples; None if the solver has no answer."""
         cost = np.zeros(self.unknowns)
         cost[0] = self._sign
-        x = _solve(cost, [(F, G) for F, G in self._stacked()])
+        x = minimise(cost, [(F, G) for F, G in self._stacked()])
         return None if x is None else float(x[0])
 
     def widest(self, bound: float) -> tuple[FloatArray, float] | None:
@@ -186,7 +170,7 @@ class ChainProgram:
             fixed.append((F + bound * G[:, 0], np.concatenate([margin, G[:, 1:]], axis=1)))
         cost = np.zeros(self.unknowns)
         cost[0] = -1.0
-        x = _solve(cost, fixed)
+        x = minimise(cost, fixed)
         return None if x is None else (x[1:], float(x[0]))
 
     def add_violators(self, bound: float, unknowns: FloatArray, margin: float) -> float:
@@ -198,7 +182,7 @@ class ChainProgram:
         smallest = np.inf
         point = np.concatenate([[bound], unknowns])
         for k in range(1, len(self._joints)):
-            dense = _coordinates(self._joints[k].lower, self._joints[k].upper, DENSE_ANGLES)
+            dense = coordinates_of(self._joints[k].lower, self._joints[k].upper, DENSE_ANGLES)
             F, G = self.blocks(k, dense)
             lowest = np.linalg.eigvalsh(F + np.einsum("u,nuij->nij", point, G))[:, 0]
             lowest = lowest.reshape(len(self.pairing.true[k]), len(dense)).min(axis=0)
@@ -213,10 +197,9 @@ class ChainProgram:
         matrices = []
         for k, size in enumerate(self._sizes):
             part = unknowns[self._places(k).start - 1 : self._places(k).stop - 1]
-            scaled = np.einsum("u,uij->ij", part, _symmetric_basis(size))
+            scaled = np.einsum("u,uij->ij", part, symmetric_basis(size))
             own = scaled * self._first_inertia() if k == 0 else scaled / np.outer(self._scales[k], self._scales[k])
-            step = 2.0 ** (np.ceil(np.log2(max(np.abs(own).max(), 1e-300))) - STORAGE_BITS)
-            matrices.append(np.round(own / step) * step)
+            matrices.append(rounded(own))
         return tuple(matrices)
 
 
@@ -250,40 +233,3 @@ def find_storages(pairing: InertiaPairing, side: Side, spare: float = SPARE) -> 
             return Storages(bound, program.storages(unknowns), smallest, round_number + 1)
         best = program.best_bound()
     return None
-
-
-def _coordinates(lower: float, upper: float, per_turn: int) -> FloatArray:
-    """Evenly spaced coordinates, ends included: so many a turn, and no fewer than a few."""
-    if not np.isfinite(upper - lower) or upper - lower >= 2.0 * pi:
-        return np.linspace(-pi, pi, per_turn, endpoint=False)
-    return np.linspace(lower, upper, max(FEWEST_ANGLES, round(per_turn * (upper - lower) / (2.0 * pi)) + 1))
-
-
-def _symmetric_basis(size: int) -> FloatArray:
-    """Symmetric matrices with a one at (i, j) and (j, i), i <= j, (count, size, size)."""
-    i, j = np.triu_indices(size)
-    basis = np.zeros((len(i), size, size))
-    basis[np.arange(len(i)), i, j] = 1.0
-    basis[np.arange(len(i)), j, i] = 1.0
-    return basis
-
-
-def _solve(cost: FloatArray, blocks: list[tuple[FloatArray, FloatArray]]) -> FloatArray | None:
-    """Minimise ``cost . x`` subject to ``F + sum x_u G_u >= 0`` for all blocks (N, s, s) and (N, u, s, s)."""
-    rows, offsets, cones = [], [], []
-    for F, G in blocks:
-        size = F.shape[-1]
-        j, i = np.tril_indices(size)  # upper triangle, column by column
-        weight = np.where(i == j, 1.0, np.sqrt(2.0))
-        offsets.append((F[:, i, j] * weight).ravel())
-        rows.append(-(G[:, :, i, j] * weight).transpose(0, 2, 1).reshape(-1, len(cost)))
-        cones += [clarabel.PSDTriangleConeT(size)] * len(F)
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.max_threads = 1
-    A = sparse.csc_matrix(np.vstack(rows))
-    quadratic = sparse.csc_matrix((len(cost), len(cost)))
-    solution = clarabel.DefaultSolver(quadratic, cost, A, np.concatenate(offsets), cones, settings).solve()
-    x = np.asarray(solution.x)
-    usable = str(solution.status) in {"Solved", "AlmostSolved", "InsufficientProgress"} and np.all(np.isfinite(x))
-    return x if usable else None

@@ -113,6 +113,7 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
     "dob-moving": ControllerKind(
         "dob-acceleration with one Lyapunov function for all motions, proved; positions only",
         "acceleration.law.moving_acceleration_law",
+        in_space="acceleration.tree_law.moving_tree_acceleration_law",
     ),
     "dob-acceleration": ControllerKind(
         "disturbance-observer tracking at the acceleration level, positions only (default)",

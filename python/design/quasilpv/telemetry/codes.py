@@ -28,6 +28,7 @@ FAULT_CAUSES = (
     "measurement implausible",
     "speed beyond the domain",
     "start refused",
+    "outside the limits of the proof",
 )
 
 TORQUE_SATURATED, SLEW_LIMITED = 1 << 2, 1 << 3

@@ -17,12 +17,6 @@ namespace quasilpv {
 
 class Field;
 
-/// Interval of one joint.
-struct Interval {
-  double low = 0.0;
-  double high = 0.0;
-};
-
 /// Operating domain the design was made for; entries from the number of joints on are unused.
 struct OperatingDomain {
   std::array<Interval, kMaxJoints> angle_rad{};

@@ -29,7 +29,8 @@ enum class FaultCause : std::int32_t {
   kPlantFailed = 9,              ///< the plant said that it cannot go on
   kMeasurementImplausible = 10,  ///< too many consecutive invalid or missing measurements, the last one implausible
   kSpeedBeyondDomain = 11,       ///< too many consecutive estimated speeds beyond what the domain allows
-  kStartRefused = 12             ///< the first measurement is outside the operating domain: no torque was commanded
+  kStartRefused = 12,            ///< the first measurement is outside the operating domain: no torque was commanded
+  kOutsideProof = 13             ///< too many consecutive samples with a joint outside what the proof assumes
 };
 
 const char* to_string(ControllerState state) noexcept;
@@ -39,6 +40,7 @@ const char* to_string(FaultCause cause) noexcept;
 struct FailsafeSettings {
   std::int64_t invalid_limit = 20;                ///< fault at so many consecutive invalid or missing measurements
   std::int64_t speed_limit = 20;                  ///< fault at so many consecutive speeds beyond the domain
+  std::int64_t outside_limit = 20;                ///< fault at so many consecutive samples outside the proof's limits
   std::int64_t overrun_limit = 20;                ///< fault above so many consecutive overruns
   std::int64_t foreign_limit = 100;               ///< fault at so many consecutive foreign messages
   std::int64_t premise_degraded_ns = 20'000'000;  ///< degraded when outside the box for longer
@@ -59,6 +61,7 @@ struct FailsafeFlags {
   bool measurement_implausible = false;     ///< the last of the invalid measurements came, but cannot be true
   std::int64_t consecutive_speeds = 0;      ///< estimated speeds beyond what the domain allows, up to this one
   bool start_refused = false;
+  std::int64_t consecutive_outside = 0;  ///< samples with a joint outside what the proof assumes, up to this one
 };
 
 /// What the policy remembers from one sample to the next.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <memory>
 
 #include "quasilpv/block_polytope.hpp"
@@ -41,6 +42,13 @@ struct LyapunovBound {
   double innovation_share = 1.0;                         ///< what the correction leaves of the innovation, != 0: 1 - l1
 };
 
+/// Angles, rad, and largest speeds, rad/s, of the motions that a law was designed for (docs/concepts/motion.md);
+/// entries from the number of joints on are unused.
+struct MotionLimits {
+  std::array<Interval, kMaxJoints> angle_rad{};
+  JointArray speed_rad_s{};
+};
+
 /// The parameters of a law, read from an artifact and never changed. Each kind of law is a class of its own, in one
 /// file of `src/laws` that nobody else includes; the registry beside them names all kinds.
 class LawParameters {
@@ -56,6 +64,8 @@ class LawParameters {
   virtual const Program* coriolis() const noexcept { return nullptr; }
   /// What the monitor watches; null: the law was not designed for one.
   virtual const LyapunovBound* lyapunov_bound() const noexcept { return nullptr; }
+  /// Beyond which motions the law's proof says nothing; null: its proof does not depend on the motion.
+  virtual const MotionLimits* motion_limits() const noexcept { return nullptr; }
 
   /// The law with these parameters, at its beginning. Dispatches once on the number of joints. INIT-ONLY.
   virtual std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const = 0;

@@ -12,6 +12,7 @@
 #include "quasilpv/monitor.hpp"
 #include "quasilpv/plausibility.hpp"
 #include "quasilpv/post_mortem.hpp"
+#include "quasilpv/proved_limits.hpp"
 #include "quasilpv/robot.hpp"
 #include "quasilpv/safe_torque.hpp"
 #include "quasilpv/telemetry_ring.hpp"
@@ -128,6 +129,7 @@ class ControlLoop {
   SafeTorque safe_torque_;
   Monitor monitor_;
   Plausibility plausibility_;
+  ProvedLimits proved_limits_;
   JoiningSegment joining_;
   FailsafeState failsafe_;
   FailsafeFlags observed_;
@@ -146,6 +148,7 @@ class ControlLoop {
   JointArray held_angle_{};
   bool implausible_ = false;  // the last reading
   std::int64_t consecutive_speeds_ = 0;
+  std::int64_t consecutive_outside_ = 0;
   std::int64_t last_seq_ = -1;
   std::int64_t faults_ = 0;
   std::int64_t consecutive_invalid_ = 0;

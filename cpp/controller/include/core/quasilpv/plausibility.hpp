@@ -6,6 +6,7 @@
 #include <string>
 
 #include "quasilpv/artifact.hpp"
+#include "quasilpv/proved_limits.hpp"
 #include "quasilpv/step.hpp"
 
 namespace quasilpv {
@@ -24,7 +25,8 @@ std::string to_string(const StartRefusal& refusal);
 /// Judges measurements by the artifact's operating domain. A speed counts as possible up to *twice* the largest of the
 /// domain, w = 2 max |speed domain|.
 ///
-/// * **Start**: every angle in its interval. A joint with an interval of a whole turn or more has no domain in which
+/// * **Start**: every angle in its interval, and within the limits of the proof (ProvedLimits). A joint with an
+/// interval of a whole turn or more has no domain in which
 ///   turns can be told apart: it starts within 1 rad of the reference.
 /// * **Next**, n samples after the last accepted one: no joint moved by more than w T n, nor is it further than w T (1
 /// +
@@ -70,6 +72,7 @@ class Plausibility {
   double sample_period_s_;
   bool reads_speed_;
   OperatingDomain domain_;
+  ProvedLimits proved_limits_;
   JointArray fastest_{};  // w, rad/s
   std::int64_t last_seq_ = 0;
   std::int64_t refused_ = 0;  // since the last accepted one

@@ -12,6 +12,12 @@ inline constexpr int kMaxPremises = 32;
 /// One value per joint; entries from the number of joints on are zero.
 using JointArray = std::array<double, kMaxJoints>;
 
+/// Interval of one joint.
+struct Interval {
+  double low = 0.0;
+  double high = 0.0;
+};
+
 /// Reference of one sample: angle (rad), speed (rad/s), acceleration (rad/s^2).
 struct Reference {
   JointArray angle{};
@@ -42,7 +48,8 @@ enum StepFlag : std::uint32_t {
   kReferenceInvalid = 1u << 5,        ///< NaN or Inf in the reference: the last valid reference was kept, at rest
   kModelInvalid = 1u << 6,            ///< gravity not finite or design inertia not positive definite here
   kMeasurementImplausible = 1u << 7,  ///< the measurement cannot be true (Plausibility): predicted instead
-  kSpeedBeyondDomain = 1u << 8  ///< the estimated speed of a joint is beyond what the domain allows (Plausibility)
+  kSpeedBeyondDomain = 1u << 8,  ///< the estimated speed of a joint is beyond what the domain allows (Plausibility)
+  kOutsideProof = 1u << 9        ///< angle or estimated speed of a joint outside what the proof assumes (ProvedLimits)
 };
 
 /// Result of one step. Disturbances are in the coordinates of the law: torques (N m), or accelerations (rad/s^2).

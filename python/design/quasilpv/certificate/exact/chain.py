@@ -82,7 +82,7 @@ class ChainJoint:
             one, K2 = identity(3), K * K
             # (1 + t^2) (I - sin q K + (1 - cos q) K^2), with sin q = sign 2 t / (1 + t^2) and cos q likewise
             turned = (one + K2 * (1 - sign), K * (-2 * sign), one + K2 * (1 + sign))
-            X = tuple(_block_diagonal(R, R) * fixed for R in turned)
+            X = tuple(block_diagonal(R, R) * fixed for R in turned)
             yield Chart(X, (fmpq(1), fmpq(0), fmpq(1)), low, high, half_turns)
 
 
@@ -113,6 +113,14 @@ class Chart:
         value = to_float(t)
         return value if self.half_turns is None else self.half_turns * pi + 2.0 * atan(value)
 
+    @property
+    def turning(self) -> Polynomial:
+        """``weight(t) dX/dq`` as a polynomial."""
+        if self.half_turns is None:
+            return self.motion[1:]
+        P0, P1, P2 = self.motion  # dq/dt = 2 / (1 + t^2); the power t^3 cancels
+        return P1 / 2, P2 - P0, P1 / -2
+
     def inequality(self, before: fmpq_mat, twist: fmpq_mat, stored: fmpq_mat, constant: fmpq_mat) -> Polynomial:
         """``weight^2 (T' stored T + constant)`` with ``T = [X before, twist]``."""
         columns = [X * before for X in self.motion]
@@ -121,6 +129,10 @@ class Chart:
             stack([[columns[i] if i < len(columns) else none, twist * (self.weight[i] if i < len(self.weight) else 0)]])
             for i in range(max(len(columns), len(self.weight)))
         ]
+        return self.congruence(T, stored, constant)
+
+    def congruence(self, T: Sequence[fmpq_mat], stored: fmpq_mat, constant: fmpq_mat) -> Polynomial:
+        """``weight^2 (T' stored T + constant)``, given ``weight T`` by its coefficients."""
         size = T[0].ncols()
         total = [zero(size, size) for _ in range(2 * len(T) - 1)]
         for i, left in enumerate(T):
@@ -181,7 +193,7 @@ def prove_chain(joints: Sequence[ChainJoint], form: ChainForm, storages: Sequenc
     cells = 0
     for k in range(n):
         for entry, chart in _inequalities(k, joints, form, storages):
-            outcome = _positive_on(entry, chart.low, chart.high)
+            outcome = positive_on(entry, chart.low, chart.high)
             if not isinstance(outcome, int):
                 return ChainProof(False, cells, k + 1, chart.coordinate(outcome))
             cells += outcome
@@ -199,14 +211,14 @@ def _inequalities(
             yield (twist.transpose() * D * twist + ahead + rotor,), Chart.point()
         return
     before = joints[0].twist if k == 1 else identity(6)
-    constant = _block_diagonal(storages[k - 1] * fmpq(-1), rotor)
+    constant = block_diagonal(storages[k - 1] * fmpq(-1), rotor)
     for D in form.bodies[k]:
         stored = D + storages[k] if k < len(storages) else D
         for chart in joints[k].charts():
             yield chart.inequality(before, twist, stored, constant), chart
 
 
-def _positive_on(entry: Polynomial, low: fmpq, high: fmpq) -> int | fmpq:
+def positive_on(entry: Polynomial, low: fmpq, high: fmpq) -> int | fmpq:
     """In how many cells a matrix polynomial was proved positive definite on [low, high]; or a point where it was not.
 
     Doubles decide which cells are put to the exact test, and are believed where they say that it is not positive.
@@ -290,6 +302,7 @@ def _cross(vector: Sequence[float]) -> fmpq_mat:
     return matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
-def _block_diagonal(first: fmpq_mat, second: fmpq_mat) -> fmpq_mat:
+def block_diagonal(first: fmpq_mat, second: fmpq_mat) -> fmpq_mat:
+    """One matrix beside the other."""
     rows, columns = first.nrows(), second.ncols()
     return stack([[first, zero(rows, columns)], [zero(second.nrows(), first.ncols()), second]])

@@ -55,6 +55,7 @@ PLANT_DEGREE = 2
 """Of the sampled plant in the share of the sample in which the new command acts."""
 
 MAX_HALVINGS = 6
+ONE_CIRCLE = fmpq(1)
 
 
 class LyapunovDocument(WitnessDocument):
@@ -151,7 +152,7 @@ def is_proved_in_motion(
 
 
 def satisfies_circle_criterion(
-    data: AccelerationLoopData, centre: fmpq, radius: fmpq, longest_delay_samples: fmpq
+    data: AccelerationLoopData, centre: fmpq, radius: fmpq, longest_delay_samples: fmpq, contraction: fmpq = ONE_CIRCLE
 ) -> bool:
     """Whether (circle) is proved for both neighbours of the filter pole and every constant delay up to the longest.
 
@@ -159,6 +160,7 @@ def satisfies_circle_criterion(
         data: the law as shipped.
         centre, radius: c and r of the disc.
         longest_delay_samples: in [0, 1].
+        contraction: radius in (0, 1] of the circle, and of the disk of the roots: V falls by its square every sample.
 
     Raises:
         InputError: the delay is out of range.
@@ -168,14 +170,21 @@ def satisfies_circle_criterion(
     controllers = [Controller.of(data, pole) for pole in data.filter_poles()]
     earliest = 1 - longest_delay_samples
     return all(
-        _is_schur_at(c, centre) and _separated(_gap_by_powers(c, centre, radius), earliest, fmpq(1))
+        _is_schur_at(c, centre, contraction)
+        and _separated(_gap_by_powers(c, centre, radius, contraction), earliest, fmpq(1))
         for c in controllers
     )
 
 
-def _is_schur_at(controller: Controller, ratio: fmpq) -> bool:
-    polynomial = CharacteristicPolynomial.of(controller, fmpq(0))
+def _is_schur_at(controller: Controller, ratio: fmpq, contraction: fmpq) -> bool:
+    polynomial = _contracted(controller, fmpq(0), contraction)
     return is_schur(polynomial.F + ratio * polynomial.G)
+
+
+def _contracted(controller: Controller, delay: fmpq, contraction: fmpq) -> CharacteristicPolynomial:
+    """The characteristic polynomial in z over the contraction."""
+    polynomial, scaled = CharacteristicPolynomial.of(controller, delay), fmpq_poly([0, contraction])
+    return CharacteristicPolynomial(polynomial.F(scaled), polynomial.G(scaled))
 
 
 def _separated(gap: Sequence[fmpq_poly], low: fmpq, high: fmpq, halvings: int = MAX_HALVINGS) -> bool:
@@ -188,12 +197,12 @@ def _separated(gap: Sequence[fmpq_poly], low: fmpq, high: fmpq, halvings: int = 
     return all(_separated(gap, *part, halvings - 1) for part in ((low, middle), (middle, high)))
 
 
-def _gap_by_powers(controller: Controller, centre: fmpq, radius: fmpq) -> list[fmpq_poly]:
+def _gap_by_powers(controller: Controller, centre: fmpq, radius: fmpq, contraction: fmpq) -> list[fmpq_poly]:
     """``|F + c G|^2 - r^2 |G|^2`` on the circle by powers of e: polynomials in the cosine of the phase.
 
     F does not depend on e. G is quadratic in e; its coefficients follow from its values at e = 1, 3/4 and 1/2.
     """
-    now, quarter, half = (CharacteristicPolynomial.of(controller, fmpq(d, 4)) for d in range(3))
+    now, quarter, half = (_contracted(controller, fmpq(d, 4), contraction) for d in range(3))
     g2 = 8 * (now.G - 2 * quarter.G + half.G)
     g1 = 2 * (now.G - half.G) - fmpq(3, 2) * g2
     g0 = now.G - g1 - g2

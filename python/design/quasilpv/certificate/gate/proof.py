@@ -34,6 +34,7 @@ from quasilpv.certificate.gate.loop import (
 from quasilpv.certificate.gate.lyapunov import Bound, is_function_proved
 from quasilpv.certificate.gate.margin import ZERO, InertiaMargin, inertia_margin
 from quasilpv.certificate.gate.motion import MotionDocument, is_proved_in_motion
+from quasilpv.certificate.gate.tree_motion import Limits, TreeMotion, tree_motion
 from quasilpv.certificate.reading import Shipped, WitnessDocument
 from quasilpv.certificate.robot.data import inertia_data
 from quasilpv.certificate.robot.range import InertiaPair, NeededRange, Place, needed_range
@@ -73,6 +74,7 @@ class RobustGate:
         seconds_to_find: how long the design took for the storages of the needed range; None if it has none.
         seconds_to_check: how long the proof of the needed range took.
         lag: shortest and longest time constant of the drives, common to all joints, in samples.
+        condition: within which angles and speeds `motion` holds; None if it holds for all motions, or is not claimed.
     """
 
     loop: AccelerationLoopData
@@ -86,6 +88,7 @@ class RobustGate:
     seconds_to_find: float | None = None
     seconds_to_check: float | None = None
     lag: Interval = NO_LAG
+    condition: TreeMotion | None = None
 
     def __repr__(self) -> str:
         """The verdict in a line."""
@@ -156,10 +159,19 @@ class RobustGate:
             "delay_margin_s": self.delay_margin_s,
             "lag_s": list(self.lag_s),
             "proved_in_motion": self.motion,
+            **self._condition_document(),
             "needed_range": None if self.needed is None else list(self.needed.to_floats()),
             "sampled_range": None if self.sampled_range is None else list(self.sampled_range),
             "worst_growth_rate_per_s": None if worst is None else worst.growth_rate_per_s,
             "where": where,
+        }
+
+    def _condition_document(self) -> dict[str, Any]:
+        found = self.condition
+        return {
+            "motion_box_rad": None if found is None else [list(interval) for interval in found.limits.angle_rad],
+            "motion_speed_limit_rad_s": None if found is None else list(found.limits.speed_rad_s),
+            "beta_per_s": None if found is None else found.rate_per_s,
         }
 
     def timed_document(self) -> dict[str, Any]:
@@ -178,7 +190,11 @@ class MotionWitness(WitnessDocument):
 
 
 def robust_gate(
-    shipped: Shipped[Any], loop: AccelerationLoopData, delay_samples: fmpq, bound: Bound | None = None
+    shipped: Shipped[Any],
+    loop: AccelerationLoopData,
+    delay_samples: fmpq,
+    bound: Bound | None = None,
+    limits: Limits | None = None,
 ) -> RobustGate:
     """Put an artifact to the gate.
 
@@ -187,6 +203,7 @@ def robust_gate(
         loop: its law.
         delay_samples: the transport delay it has to tolerate, in samples.
         bound: the bound of a Lyapunov function, if the law ships one.
+        limits: of the motions it was designed for, if it ships some.
 
     Raises:
         InputError: a robot the gate does not know, or data that contradict each other.
@@ -194,7 +211,10 @@ def robust_gate(
     lag = _lag(shipped, loop)
     margin = inertia_margin(loop, delay_samples, lag[1])
     if isinstance(shipped.mechanism, Tree):
-        return _tree_gate(shipped, RobustGate(loop, delay_samples, margin, None, None, None, lag=lag))
+        return _tree_gate(shipped, RobustGate(loop, delay_samples, margin, None, None, None, lag=lag), limits)
+    if limits is not None:
+        expected = "no member of this name: for a planar robot the proof holds for all motions"
+        raise InputError(shipped.source, "law.motion_limits", "limits", expected)
     began = time.perf_counter()
     inertia = InertiaPair(inertia_data(shipped))
     needed = needed_range(inertia)
@@ -228,12 +248,13 @@ def _lag(shipped: Shipped[Any], loop: AccelerationLoopData) -> Interval:
     return low, high
 
 
-def _tree_gate(shipped: Shipped[Any], opened: RobustGate) -> RobustGate:
+def _tree_gate(shipped: Shipped[Any], opened: RobustGate, limits: Limits | None) -> RobustGate:
     """The gate of a robot in space, whose needed range is proved with the storages of its witness.
 
     Args:
         shipped: the artifact.
         opened: the gate with margin and lag.
+        limits: of the motions the law was designed for.
     """
     witness = shipped.witness(TreeWitness).chain
     pair = TreePair(TreeData.of(shipped))
@@ -251,7 +272,9 @@ def _tree_gate(shipped: Shipped[Any], opened: RobustGate) -> RobustGate:
         return gate
     delays = delay_margin(gate.loop, found.needed.lowest, found.needed.highest, gate.lag)
     worst = worst_case(gate.loop, pair, found.needed, (fmpq(0), gate.specified_delay_samples), gate.lag)
-    return replace(gate, needed=found.needed, delays=delays, worst=worst)
+    condition = tree_motion(shipped, pair.data, found.needed, gate.loop, limits)
+    motion = None if condition is None else condition.proved and gate.lag[1] == 0
+    return replace(gate, needed=found.needed, delays=delays, worst=worst, motion=motion, condition=condition)
 
 
 def _proved_in_motion(

@@ -17,9 +17,10 @@ the time unit ``1/w`` of each chain (w: the bandwidth in the witness), with ``t 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 from flint import fmpq, fmpq_mat
+from pydantic import model_validator
 
 from quasilpv.certificate.exact.claims import Claim, Evidence
 from quasilpv.certificate.exact.matrices import identity, matrix, rational, symmetric, trace, zero
@@ -32,7 +33,7 @@ from quasilpv.certificate.reading import Rows, Shipped, WitnessDocument
 from quasilpv.certificate.robot.design_model import check_design_model
 from quasilpv.documents.law import ChainLaw
 from quasilpv.documents.strict_model import FieldError, Number, Positive, StrictModel
-from quasilpv.documents.tables import Matrix, PolytopeTable, require_lyapunov
+from quasilpv.documents.tables import Intervals, Matrix, PolytopeTable, Vector, require_lyapunov
 
 KNOWN_SIGNALS = 5
 """Of one joint: what of the loop is known at run time."""
@@ -53,16 +54,44 @@ class LyapunovBound(StrictModel):
     joints: Matrix
 
 
+class MotionLimits(StrictModel):
+    """Angles and speeds of the motions that a law for a robot in space was designed for; the run time enforces them."""
+
+    angle_rad: Intervals
+    speed_rad_s: Vector
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for j, (low, high) in enumerate(self.angle_rad):
+            if not low < high:
+                raise FieldError(f"angle_rad[{j}]", [low, high], "a lower bound below the upper bound")
+        for j, speed in enumerate(self.speed_rad_s):
+            if not speed > 0.0:
+                raise FieldError(f"speed_rad_s[{j}]", speed, "a number > 0")
+        return self
+
+    def require_joints(self, joints: int) -> None:
+        """Raise ``FieldError`` unless there is an interval and a speed for every joint."""
+        for field in ("angle_rad", "speed_rad_s"):
+            if len(getattr(self, field)) != joints:
+                expected = f"{joints}, one per joint"
+                raise FieldError(f"law.motion_limits.{field}", f"{len(getattr(self, field))} entries", expected)
+
+
 class DobAccelerationLaw(ChainLaw):
     """Tracking at the acceleration level with a disturbance observer, the same scalars for every joint.
 
     With ``disturbance_compensation`` false the observer runs but its filtered disturbance is not fed back.
-    ``lyapunov_bound`` is for the monitor (``docs/concepts/motion.md``).
+    ``lyapunov_bound`` is for the monitor, ``motion_limits`` for the run time (``docs/concepts/motion.md``).
     """
 
     DISTURBANCE = "acceleration"
 
-    optional: ClassVar[Mapping[str, str]] = {**ChainLaw.optional, "lyapunov_bound": "two matrices"}
+    optional: ClassVar[Mapping[str, str]] = {
+        **ChainLaw.optional,
+        "lyapunov_bound": "two matrices",
+        "motion_limits": "limits",
+    }
 
     kind: Literal["dob-acceleration"]
     feedback: Feedback
@@ -70,10 +99,13 @@ class DobAccelerationLaw(ChainLaw):
     filter_time_constant_s: Positive
     disturbance_compensation: bool
     lyapunov_bound: LyapunovBound | None = None
+    motion_limits: MotionLimits | None = None
 
     def check(self, joints: int) -> None:
         """See `LawDocument.check`."""
         super().check(joints)
+        if self.motion_limits is not None:
+            self.motion_limits.require_joints(joints)
         if self.lyapunov_bound is None:
             return
         require_lyapunov("law.lyapunov_bound.signals", self.lyapunov_bound.signals, KNOWN_SIGNALS)
@@ -142,7 +174,8 @@ def loop_data(shipped: Shipped[DobAccelerationLaw]) -> AccelerationLoopData:
 
 def gate(shipped: Shipped[DobAccelerationLaw], delay_samples: fmpq) -> RobustGate:
     """The proof of the scalar loop for all that `quasilpv.certificate.gate.proof` says."""
-    return robust_gate(shipped, loop_data(shipped), delay_samples, shipped.law.lyapunov_bound)
+    law = shipped.law
+    return robust_gate(shipped, loop_data(shipped), delay_samples, law.lyapunov_bound, law.motion_limits)
 
 
 def _feedback_claims(period: fmpq, gains: Feedback, witness: FeedbackWitness) -> tuple[Claim, ...]:

@@ -95,7 +95,7 @@ class TreeData:
                     got, expected = getattr(design, field), f"{getattr(own, field)}, that of the robot"
                     raise InputError(source, f"law.inertia.joints[{k}].{field}", got, expected)
         return cls(
-            joints=_chain(robot, shipped.artifact.domain.angle_rad),
+            joints=chain_of(robot, shipped.artifact.domain.angle_rad),
             nominal=TreeInertia.of(robot),
             design=TreeInertia.of(inertia),
             link_tolerance=rational(payloads.link_tolerance),
@@ -147,7 +147,8 @@ def cross(vector: fmpq_mat) -> fmpq_mat:
     return matrix([[fmpq(0), -z, y], [z, fmpq(0), -x], [-y, x, fmpq(0)]])
 
 
-def _chain(tree: Tree, angle_rad: Sequence[Sequence[float]]) -> tuple[ChainJoint, ...]:
+def chain_of(tree: Tree, angle_rad: Sequence[Sequence[float]]) -> tuple[ChainJoint, ...]:
+    """The joints of a robot, with these intervals as limits."""
     return tuple(
         ChainJoint(
             turns=joint.turns,

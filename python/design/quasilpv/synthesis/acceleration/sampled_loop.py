@@ -166,10 +166,10 @@ class SampledLoop:
         worst = int(np.argmax(rates))
         return rates[worst], float(ratios[worst])
 
-    def open_loop(self, phase: FloatArray) -> ComplexArray:
-        """Loop transfer L(e^{j phase}) per unit mu: the loop is on its stability limit where ``mu L = 1``."""
+    def open_loop(self, phase: FloatArray, radius: float = 1.0) -> ComplexArray:
+        """Loop transfer L at ``z = radius e^{j phase}`` per unit mu: there is a pole at z where ``mu L = 1``."""
         whole, late = self._delay
-        z = np.exp(1j * phase)
+        z = radius * np.exp(1j * phase)
         shift = z - 1.0
         position = (1.0 - late) ** 2 / 2 + (late - late**2 / 2) / z
         speed = (1.0 - late) + late / z

@@ -12,7 +12,6 @@ from typing import Protocol
 
 import numpy as np
 
-from quasilpv.synthesis.acceleration.moving_inertia import InertiaDisc
 from quasilpv.synthesis.acceleration.sampled_loop import AccelerationLaw, SampledLoop
 from quasilpv.synthesis.specification import Specification
 
@@ -36,6 +35,18 @@ class Tolerated:
     margin: tuple[float, float]
     span: float
     scales: tuple[float, float] | None
+
+
+class Disc(Protocol):
+    """A disc around a multiple of the identity that holds ``M_t^-1 M_n`` in suitable coordinates."""
+
+    @property
+    def centre(self) -> float:
+        """c."""
+
+    @property
+    def radius(self) -> float:
+        """r."""
 
 
 class Range(Protocol):
@@ -99,15 +110,19 @@ class MovingTolerance:
     """Postures and payloads that change from sample to sample: the circle criterion for the disc of ``M_t^-1 M_n``.
 
     Without delay and with the specified one, ``|1 - c L| > r |L|`` on the unit circle, L the loop transfer per unit mu;
-    the frozen loop must be stable as well. References: as for `quasilpv.certificate.gate.motion`.
+    the frozen loop must be stable as well. Where the shape of the function changes with the posture, by a factor of at
+    most exp(beta t) in a time t, the circle is that of radius exp(-beta T / 2). References: as for
+    `quasilpv.certificate.gate.motion` and `quasilpv.certificate.gate.tree_motion`.
 
     Attributes:
         frozen: the demand on every posture on its own.
         disc: of the nominal inertia.
+        rate_per_s: beta.
     """
 
     frozen: FrozenTolerance
-    disc: InertiaDisc
+    disc: Disc
+    rate_per_s: float = 0.0
 
     @property
     def span(self) -> float:
@@ -131,7 +146,16 @@ class MovingTolerance:
             return Tolerated(frozen.margin, span, None)
         smallest, largest = max(wide[0], frozen.scales[0]), min(wide[-1], frozen.scales[1])
         scales = (float(smallest), float(largest)) if smallest <= largest else None
+        if scales is not None and not all(self._decays(law, scale) for scale in scales):
+            scales = None
         return Tolerated(frozen.margin, span, scales)
+
+    def _decays(self, law: AccelerationLaw, scale: float) -> bool:
+        """Whether the frozen loop at the centre of the disc falls fast enough; nothing is asked for with rate 0."""
+        if self.rate_per_s == 0.0:
+            return True
+        loop = SampledLoop(law, self.frozen.specification.delay_s)
+        return loop.growth_rate(scale * self.disc.centre) < -self.rate_per_s / 2.0
 
     def _relative_radii(self, law: AccelerationLaw, delay_s: float) -> np.ndarray:
         """Per scale s, the largest radius the loop tolerates around s c, over s c; 0 where it is not stable there."""
@@ -140,7 +164,10 @@ class MovingTolerance:
         margin = loop.inertia_margin()
         if margin is None:
             return np.zeros(CENTRES)
-        L = loop.open_loop(np.geomspace(1e-3, np.pi, PHASES))
+        contraction = float(np.exp(-self.rate_per_s * law.sample_period_s / 2.0))
+        # Off the unit circle low phases decide too: zero, where the integrators' poles are outside, included.
+        phases = np.geomspace(1e-3, np.pi, PHASES)
+        L = loop.open_loop(phases if contraction == 1.0 else np.append(0.0, phases), contraction)
         radii = 1.0 / np.abs(L / (1.0 - np.outer(centres, L))).max(axis=1)
         stable = (centres * margin[0] < 1.0) & (centres * margin[1] > 1.0)
         return np.asarray(np.where(stable, radii / centres, 0.0))

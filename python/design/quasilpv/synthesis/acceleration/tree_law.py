@@ -11,17 +11,20 @@ action: the observer integrates already, and two integrators make an arm that st
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from quasilpv.certificate.laws.dob_acceleration import DobAccelerationLaw
 from quasilpv.conditions.tracking.sampled_chains import ChainGains
+from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.search import BandwidthSearch, Candidate, Grid, growth_rates
-from quasilpv.synthesis.acceleration.tolerance import FrozenTolerance
+from quasilpv.synthesis.acceleration.tolerance import FrozenTolerance, MovingTolerance
 from quasilpv.synthesis.chain_range import ChainRange, find_range
+from quasilpv.synthesis.rate_storages import RateStorages, find_rate
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
@@ -47,6 +50,18 @@ class _Range:
     lowest: float
     highest: float
 
+    @property
+    def disc(self) -> _Disc:
+        """Of the eigenvalues of ``M_t^-1 M(empty)``, which is symmetric in the coordinates of the root of M(empty)."""
+        fast, slow = 1.0 / self.lowest, 1.0 / self.highest
+        return _Disc((fast + slow) / 2.0, (fast - slow) / 2.0)
+
+
+@dataclass(frozen=True)
+class _Disc:
+    centre: float
+    radius: float
+
 
 def tree_acceleration_law(
     robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
@@ -61,13 +76,85 @@ def tree_acceleration_law(
     Raises:
         InfeasibleError: no bounds of the inertia were found, or no design meets the specification.
     """
+    return _law(robot, specification, progress, None)
+
+
+def moving_tree_acceleration_law(
+    robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
+) -> TrackingDesign:
+    """Design `dob-moving` for a robot in space: the same, and a function that falls in motion, within stated limits.
+
+    Arguments and errors are those of `tree_acceleration_law`, and
+
+    Raises:
+        InputError: the drives lag.
+        InfeasibleError: no bound of how fast the inertia changes was found for these limits.
+    """
+    if robot.lag_s[1] > 0.0:
+        expected = "0 for dob-moving: the proof in motion knows no lag (dob-acceleration does)"
+        raise InputError(robot.source, "lag", list(robot.lag_s), expected)
+    return _law(robot, specification, progress, MotionBound.of(robot))
+
+
+@dataclass(frozen=True, eq=False)
+class MotionBound:
+    """How fast the inertia changes within limits of angles and speeds.
+
+    Attributes:
+        angle_rad, speed_rad_s: the limits.
+        found: rate and storages of the empty robot.
+        seconds_to_find: how long that took.
+    """
+
+    angle_rad: tuple[tuple[float, float], ...]
+    speed_rad_s: tuple[float, ...]
+    found: RateStorages
+    seconds_to_find: float
+
+    @classmethod
+    def of(cls, robot: SpatialRobot) -> MotionBound:
+        """For the motions a robot states.
+
+        Raises:
+            InfeasibleError: the solver has no answer.
+        """
+        began = time.perf_counter()
+        angles, speeds = robot.motion
+        limits = zip(robot.tree.joints, angles, strict=True)
+        within = replace(robot.tree, joints=tuple(replace(j, lower=low, upper=high) for j, (low, high) in limits))
+        found = find_rate(within, np.array(speeds))
+        if found is None:
+            advice = "state smaller ones: joints.NAME.motion_angle, joints.NAME.motion_speed"
+            raise InfeasibleError(
+                f"{robot.id}: no bound was found of how fast the inertia changes over these angles; {advice}"
+            )
+        return cls(angles, speeds, found, time.perf_counter() - began)
+
+    def limits_document(self) -> dict[str, Any]:
+        """The member ``motion_limits`` of a law."""
+        return {"angle_rad": [list(interval) for interval in self.angle_rad], "speed_rad_s": list(self.speed_rad_s)}
+
+    def to_document(self, scale: float, longest_delay_samples: float) -> dict[str, Any]:
+        """The member ``motion`` of a witness, for s times the empty robot as design inertia."""
+        return {
+            "rate_per_s": self.found.rate_per_s,
+            "storages": [(scale * storage).tolist() for storage in self.found.matrices],
+            "longest_delay_samples": longest_delay_samples,
+            "seconds_to_find": self.seconds_to_find,
+        }
+
+
+def _law(
+    robot: SpatialRobot, specification: Specification, progress: Progress, moving: MotionBound | None
+) -> TrackingDesign:
     found = find_range(robot, robot.tree)
     needed = _Range(found.lowest.bound, found.highest.bound)
+    frozen = FrozenTolerance(specification, needed, robot.lag_s)
     search = BandwidthSearch(
         robot.id,
         specification,
         needed,
-        FrozenTolerance(specification, needed, robot.lag_s),
+        frozen if moving is None else MovingTolerance(frozen, needed.disc, moving.found.rate_per_s),
         activity_bound=specification.torque_activity,
         noise=specification.angle_noise_rad * largest_row(robot),
         unit="of a joint's torque limit, rms",
@@ -77,8 +164,10 @@ def tree_acceleration_law(
     best = search.run(GRID, progress)
     feedback, observer = search.gains_of_best()
     kp, kd, ki = (float(gain) for gain in best.law.feedback)
+    controller = DobAccelerationLaw.tag() if moving is None else "dob-moving"
+    motion = {} if moving is None else {"motion": moving.to_document(best.inertia_scale, specification.delay_samples)}
     return TrackingDesign(
-        controller=DobAccelerationLaw.tag(),
+        controller=controller,
         robot=robot,
         sample_period_s=specification.sample_period_s,
         law={
@@ -88,11 +177,19 @@ def tree_acceleration_law(
             "filter_time_constant_s": best.law.filter_time_constant_s,
             "disturbance_compensation": True,
             **design_inertia(robot, best.inertia_scale),
+            **({} if moving is None else {"motion_limits": moving.limits_document()}),
         },
         expressions={},
-        inputs={"controller": DobAccelerationLaw.tag(), "specification": specification.to_document()},
-        report=_report(best, specification, found, search.tried, robot.lag_s[1]),
-        witness=_witness(best, feedback, observer, found),
+        inputs={
+            "controller": controller,
+            "specification": specification.to_document(),
+            **({} if moving is None else {"motion_limits": moving.limits_document()}),
+        },
+        report={
+            **_report(best, specification, found, search.tried, robot.lag_s[1]),
+            **({} if moving is None else {"motion_rate_per_s": moving.found.rate_per_s}),
+        },
+        witness={**_witness(best, feedback, observer, found), **motion},
     )
 
 

@@ -34,6 +34,8 @@ class SpatialJoint:
         rotor_tolerance: share by which it may differ, up and down.
         encoder_bits: per turn; None if nobody said.
         friction_viscous_nm_s, friction_coulomb_nm: of the true robot, as far as they are known.
+        motion_angle_rad, motion_speed_rad_s: interval and largest speed that a proof in motion holds in; None for those
+            above.
     """
 
     name: str
@@ -46,6 +48,8 @@ class SpatialJoint:
     encoder_bits: int | None
     friction_viscous_nm_s: float
     friction_coulomb_nm: float
+    motion_angle_rad: Interval | None = None
+    motion_speed_rad_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -207,6 +211,12 @@ class SpatialRobot:
             tuple(joint.friction_viscous_nm_s for joint in self.joints),
             tuple(joint.friction_coulomb_nm for joint in self.joints),
         )
+
+    @property
+    def motion(self) -> tuple[tuple[Interval, ...], tuple[float, ...]]:
+        """Intervals and largest speeds of the joints that a proof in motion holds in."""
+        angles = tuple(joint.motion_angle_rad or joint.angle_rad for joint in self.joints)
+        return angles, tuple(joint.motion_speed_rad_s or joint.speed_rad_s for joint in self.joints)
 
     @property
     def rubs(self) -> bool:

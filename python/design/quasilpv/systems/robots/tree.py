@@ -119,6 +119,18 @@ class TreeJoint:
             moved[..., :3, 3:] = -q * K
         return moved @ self.placement.motion_matrix
 
+    def motion_slopes(self, coordinate: FloatArray) -> FloatArray:
+        """dX/dq, (..., 6, 6), at coordinates (...)."""
+        K = cross_matrix(self.axis)
+        q = np.asarray(coordinate, dtype=float)[..., None, None]
+        slope = np.zeros((*q.shape[:-2], 6, 6))
+        if self.turns:
+            Rt = -np.cos(q) * K + np.sin(q) * (K @ K)
+            slope[..., :3, :3], slope[..., 3:, 3:] = Rt, Rt
+        else:
+            slope[..., :3, 3:] = -K
+        return slope @ self.placement.motion_matrix
+
 
 @dataclass(frozen=True, eq=False)
 class KinematicTree:

@@ -58,6 +58,9 @@ ROTOR_INERTIA_KG_M2 = 0.1
 VISCOUS_NM_S = (2.0, 2.0, 2.0, 0.5, 0.5, 0.5)
 COULOMB_NM = (3.0, 3.0, 3.0, 0.56, 0.56, 0.56)
 LONGEST_DELAY_S = 5e-4
+MOTION_SPEED_RAD_S = 1.0
+"""Largest speed of a joint that `dob-moving` is proved for, over the whole range of all joints."""
+
 LOAD = PayloadBody(5.0, ((-0.03, 0.03), (-0.03, 0.03), (0.02, 0.08)), (0.01, 0.01, 0.01))
 
 
@@ -110,4 +113,5 @@ def _stated(k: int) -> SpatialJoint:
         encoder_bits=20,
         friction_viscous_nm_s=VISCOUS_NM_S[k],
         friction_coulomb_nm=COULOMB_NM[k],
+        motion_speed_rad_s=MOTION_SPEED_RAD_S,
     )
