@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Makes .venv and installs into it what pyproject.toml requires; does nothing when it did so for these requirements.
+# environment.sh [EXTRA...]: makes .venv and installs into it what pyproject.toml requires, with the extra `dev` and those
+# that are named; does nothing when it did so for these requirements.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source tools/lib/say.sh
@@ -8,7 +9,7 @@ python=${PYTHON:-python3}
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
   die "$python is $("$python" -V); expected Python 3.11 or newer (set PYTHON to choose another)"
 
-requirements=$("$python" tools/lib/requirements.py)
+requirements=$("$python" tools/lib/requirements.py "$@")
 state=$(printf '%s\n' "$("$python" -VV)" "$PWD" "$requirements")
 stamp=.venv/.requirements
 if [[ -f $stamp && $(<"$stamp") == "$state" ]] && .venv/bin/python -c ''; then exit 0; fi

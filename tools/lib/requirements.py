@@ -1,5 +1,9 @@
-"""Print the pip requirements of a development environment, one a line, as pyproject.toml states them."""
+"""Print the pip requirements of a development environment, one a line, as pyproject.toml states them.
 
+Arguments: extras beside ``dev``.
+"""
+
+import sys
 import tomllib
 from pathlib import Path
 
@@ -7,6 +11,6 @@ project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text
 requirements = [
     *project["build-system"]["requires"],
     *project["project"]["dependencies"],
-    *project["project"]["optional-dependencies"]["dev"],
+    *(line for extra in ("dev", *sys.argv[1:]) for line in project["project"]["optional-dependencies"][extra]),
 ]
 print(*dict.fromkeys(requirements), sep="\n")

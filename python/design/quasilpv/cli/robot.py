@@ -148,7 +148,7 @@ def _found_document(found: InertiaRange) -> dict[str, Any]:
 
 def _sentence(found: InertiaRange) -> str:
     low, high = found.sampled_range
-    sampled = f"random postures show [{low:.4g}, {high:.4g}]"
+    sampled = f"postures, random and climbing, show [{low:.4g}, {high:.4g}]"
     if found.needed_range is None:
         return f"no range of inertias was proved; {sampled}"
     c1, c2 = found.needed_range

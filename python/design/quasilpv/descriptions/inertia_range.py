@@ -14,15 +14,40 @@ from dataclasses import dataclass
 import numpy as np
 
 from quasilpv.arrays import FloatArray
-from quasilpv.certificate.exact.chain import ChainForm, ChainJoint, prove_chain
+from quasilpv.certificate.exact.chain import ChainForm, ChainJoint, ChainProof, prove_chain
 from quasilpv.certificate.exact.matrices import matrix, rational
+from quasilpv.certificate.robot.climbing import climbed
 from quasilpv.synthesis.chain_range import inertia_pairing
 from quasilpv.synthesis.chain_storages import InertiaPairing, Side, find_storages
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
 from quasilpv.systems.robots.tree import KinematicTree
 
-SAMPLES = 2000
-SEED = 20220315
+
+@dataclass(frozen=True, eq=False)
+class RangeSide:
+    """One side of the range: what was found, which has to be proved.
+
+    Attributes:
+        side: ``"lowest"`` or ``"highest"``.
+        bound: of the ratio; None if the solver found none.
+        sampled: extreme ratio found by random postures and climbing: what a proof cannot beat.
+        seconds_to_find: of the storages.
+    """
+
+    side: Side
+    pairing: InertiaPairing
+    storages: tuple[FloatArray, ...]
+    bound: float | None
+    sampled: float
+    seconds_to_find: float
+
+    def prove(self, bound: float) -> ChainProof:
+        """Decide a bound in exact arithmetic, with the storages that were found."""
+        return prove_chain(
+            [_exact_joint(self.pairing.tree, k) for k in range(self.pairing.tree.order)],
+            _form(self.pairing, self.side, bound),
+            [matrix(storage.tolist()) for storage in self.storages],
+        )
 
 
 @dataclass(frozen=True)
@@ -31,7 +56,7 @@ class InertiaRange:
 
     Attributes:
         needed_range: (c1, c2), proved in exact arithmetic; None if no proof was found.
-        sampled_range: smallest and largest ratio over random postures: what a proof cannot beat.
+        sampled_range: smallest and largest ratio found by random postures and climbing: what a proof cannot beat.
         seconds_to_find, seconds_to_check: of the storages, and of the exact check.
         cells: intervals the check took.
     """
@@ -43,37 +68,40 @@ class InertiaRange:
     cells: int
 
 
-def proved_inertia_range(robot: SpatialRobot, design: KinematicTree | None = None) -> InertiaRange:
-    """Prove the range of inertias of a robot.
+def range_sides(robot: SpatialRobot, design: KinematicTree | None = None) -> tuple[RangeSide, RangeSide]:
+    """Search for both sides of the range of a robot: the lowest, and the highest.
 
     Args:
         robot: with its payload and uncertainties.
         design: whose inertia is M_n; the robot with half its payload if not given.
     """
     nominal = robot.loaded(0.5) if design is None else design
-    sides: dict[Side, Sequence[KinematicTree]] = {"lowest": [robot.lightest()], "highest": robot.heaviest()}
-    bounds: list[float | None] = []
-    find, check, cells = 0.0, 0.0, 0
-    for side, true in sides.items():
-        began = time.perf_counter()
-        pairing = inertia_pairing(nominal, true)
-        found = find_storages(pairing, side)
-        find += time.perf_counter() - began
-        if found is None:
-            bounds.append(None)
-            continue
-        began = time.perf_counter()
-        proof = prove_chain(
-            [_exact_joint(nominal, k) for k in range(nominal.order)],
-            _form(pairing, side, found.bound),
-            [matrix(storage.tolist()) for storage in found.matrices],
-        )
-        check += time.perf_counter() - began
-        cells += proof.cells
-        bounds.append(found.bound if proof.holds else None)
-    lowest, highest = bounds
-    needed = None if lowest is None or highest is None else (lowest, highest)
-    return InertiaRange(needed, _sampled(nominal, sides), find, check, cells)
+    return _searched(nominal, [robot.lightest()], "lowest"), _searched(nominal, robot.heaviest(), "highest")
+
+
+def proved_inertia_range(robot: SpatialRobot, design: KinematicTree | None = None) -> InertiaRange:
+    """Prove the range of inertias of a robot; arguments as of `range_sides`."""
+    sides = range_sides(robot, design)
+    bounds: list[float] = []
+    began, cells = time.perf_counter(), 0
+    for side in sides:
+        if side.bound is not None:
+            proof = side.prove(side.bound)
+            cells += proof.cells
+            bounds += [side.bound] if proof.holds else []
+    check = time.perf_counter() - began
+    needed = (bounds[0], bounds[1]) if len(bounds) == 2 else None
+    sampled, find = (sides[0].sampled, sides[1].sampled), sum(side.seconds_to_find for side in sides)
+    return InertiaRange(needed, sampled, find, check, cells)
+
+
+def _searched(design: KinematicTree, true: Sequence[KinematicTree], side: Side) -> RangeSide:
+    pairing = inertia_pairing(design, true)
+    began = time.perf_counter()
+    found = find_storages(pairing, side)
+    seconds = time.perf_counter() - began
+    bound, storages = (None, ()) if found is None else (found.bound, tuple(found.matrices))
+    return RangeSide(side, pairing, storages, bound, _sampled(design, true, side), seconds)
 
 
 def _form(pairing: InertiaPairing, side: Side, bound: float) -> ChainForm:
@@ -102,21 +130,24 @@ def _exact_joint(tree: KinematicTree, k: int) -> ChainJoint:
     )
 
 
-def _sampled(design: KinematicTree, sides: dict[Side, Sequence[KinematicTree]]) -> tuple[float, float]:
-    """Extreme ratios over random postures, corners of the limits among them."""
-    rng = np.random.default_rng(SEED)
+def _sampled(design: KinematicTree, true: Sequence[KinematicTree], side: Side) -> float:
+    """Extreme ratio over random postures, and over what is reached from the best of them by climbing."""
+    sign, at = (1.0, -1) if side == "highest" else (-1.0, 0)
     lower, upper = (
         np.array([max(-np.pi, j.lower) if j.is_full_circle else j.lower for j in design.joints]),
         np.array([min(np.pi, j.upper) if j.is_full_circle else j.upper for j in design.joints]),
     )
-    postures = rng.uniform(lower, upper, (SAMPLES, design.order))
-    corners = np.where(rng.uniform(size=postures.shape) < 0.5, lower, upper)
-    postures[: SAMPLES // 10] = corners[: SAMPLES // 10]
-    inverse = np.linalg.inv(np.linalg.cholesky(design.inertia(postures)))
 
-    def ratios(robots: Sequence[KinematicTree]) -> FloatArray:
-        return np.array(
-            [np.linalg.eigvalsh(inverse @ robot.inertia(postures) @ inverse.transpose(0, 2, 1)) for robot in robots]
+    def value(postures: FloatArray) -> FloatArray:
+        inverse = np.linalg.inv(np.linalg.cholesky(design.inertia(postures)))
+        return np.asarray(
+            np.max(
+                [
+                    sign * np.linalg.eigvalsh(inverse @ robot.inertia(postures) @ inverse.transpose(0, 2, 1))[:, at]
+                    for robot in true
+                ],
+                axis=0,
+            )
         )
 
-    return float(ratios(sides["lowest"]).min()), float(ratios(sides["highest"]).max())
+    return sign * climbed(value, lower, upper)[1]

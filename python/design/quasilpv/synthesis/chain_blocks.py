@@ -53,10 +53,18 @@ def twist_scales(joints: Sequence[TreeJoint], bodies: Iterable[FloatArray]) -> l
     return scales[::-1]
 
 
-def rounded(storage: FloatArray) -> FloatArray:
-    """A storage in short binary numbers: multiples of 2^-24 of its own scale."""
-    step = 2.0 ** (np.ceil(np.log2(max(np.abs(storage).max(), 1e-300))) - STORAGE_BITS)
-    return np.asarray(np.round(storage / step) * step)
+def rounded(scaled: FloatArray, unit: FloatArray) -> FloatArray:
+    """A storage in short binary numbers: multiples of 2^-24 of the unit that each entry is scaled by.
+
+    Not of its own largest entry: where a joint's twists leave a direction free, a storage may be 10^4 times as large as
+    the inequality's margin.
+
+    Args:
+        scaled: the storage, scaled.
+        unit: by which an entry is larger, positive; of the same shape, or one number.
+    """
+    step = 2.0 ** (np.floor(np.log2(unit)) - STORAGE_BITS)
+    return np.asarray(np.round(scaled * unit / step) * step)
 
 
 def minimise(cost: FloatArray, blocks: Sequence[Block]) -> FloatArray | None:

@@ -31,6 +31,8 @@ SPARE = 0.003
 """How far beyond the best bound of the samples the proof is asked for, relative."""
 
 ROUNDS = 8
+FINE_ANGLES = 21
+"""Between the neighbours of a place of the dense sample where little is left: the least may lie beside it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +176,7 @@ class ChainProgram:
         return None if x is None else (x[1:], float(x[0]))
 
     def add_violators(self, bound: float, unknowns: FloatArray, margin: float) -> float:
-        """Add the coordinates of a dense sample where an inequality holds by less than half the margin.
+        """Add the coordinates at which an inequality holds by less than half the margin, looked for densely.
 
         Returns:
             The smallest eigenvalue found.
@@ -183,14 +185,23 @@ class ChainProgram:
         point = np.concatenate([[bound], unknowns])
         for k in range(1, len(self._joints)):
             dense = coordinates_of(self._joints[k].lower, self._joints[k].upper, DENSE_ANGLES)
-            F, G = self.blocks(k, dense)
-            lowest = np.linalg.eigvalsh(F + np.einsum("u,nuij->nij", point, G))[:, 0]
-            lowest = lowest.reshape(len(self.pairing.true[k]), len(dense)).min(axis=0)
-            smallest = min(smallest, float(lowest.min()))
+            lowest = self._lowest(k, dense, point)
             inner = np.r_[np.inf, lowest, np.inf]
-            worst = (lowest < 0.5 * margin) & (lowest <= inner[:-2]) & (lowest <= inner[2:])
-            self._samples[k] = np.unique(np.concatenate([self._samples[k], dense[worst]]))
+            beside = np.r_[dense[0], dense, dense[-1]]
+            for at in np.flatnonzero((lowest < margin) & (lowest <= inner[:-2]) & (lowest <= inner[2:])):
+                fine = np.append(np.linspace(beside[at], beside[at + 2], FINE_ANGLES), dense[at])
+                values = self._lowest(k, fine, point)
+                smallest = min(smallest, float(values.min()))
+                if values.min() < 0.5 * margin:
+                    self._samples[k] = np.unique(np.append(self._samples[k], fine[values.argmin()]))
+            smallest = min(smallest, float(lowest.min()))
         return smallest
+
+    def _lowest(self, k: int, coordinates: FloatArray, point: FloatArray) -> FloatArray:
+        """The smallest eigenvalue of joint k's inequality at coordinates (N,), over the choices of its body."""
+        F, G = self.blocks(k, coordinates)
+        lowest = np.linalg.eigvalsh(F + np.einsum("u,nuij->nij", point, G))[:, 0]
+        return np.asarray(lowest.reshape(len(self.pairing.true[k]), len(coordinates)).min(axis=0))
 
     def storages(self, unknowns: FloatArray) -> tuple[FloatArray, ...]:
         """Matrices in their own units, rounded to short binary numbers."""
@@ -198,8 +209,8 @@ class ChainProgram:
         for k, size in enumerate(self._sizes):
             part = unknowns[self._places(k).start - 1 : self._places(k).stop - 1]
             scaled = np.einsum("u,uij->ij", part, symmetric_basis(size))
-            own = scaled * self._first_inertia() if k == 0 else scaled / np.outer(self._scales[k], self._scales[k])
-            matrices.append(rounded(own))
+            unit = np.array(self._first_inertia()) if k == 0 else 1.0 / np.outer(self._scales[k], self._scales[k])
+            matrices.append(rounded(scaled, unit))
         return tuple(matrices)
 
 

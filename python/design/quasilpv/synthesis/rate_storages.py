@@ -193,7 +193,7 @@ class RateProgram:
         matrices = []
         for k, size in enumerate(self._sizes):
             part = unknowns[self._places(k).start - 1 : self._places(k).stop - 1]
-            scaled = rounded(np.einsum("u,uij->ij", part, symmetric_basis(size)))
+            scaled = rounded(np.einsum("u,uij->ij", part, symmetric_basis(size)), np.array(1.0))
             if k == 0:
                 matrices.append(self.unit * scaled / self._own[0] ** 2)
                 continue

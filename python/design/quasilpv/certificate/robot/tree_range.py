@@ -20,17 +20,11 @@ from quasilpv.certificate.exact.chain import ChainProof, prove_chain
 from quasilpv.certificate.exact.matrices import matrix, rational
 from quasilpv.certificate.exact.rationals import to_floats
 from quasilpv.certificate.reading import Rows, WitnessDocument
+from quasilpv.certificate.robot.climbing import climbed
 from quasilpv.certificate.robot.range import NeededRange, Place
 from quasilpv.certificate.robot.tree import TreeData, TreeInertia
 
 Side: TypeAlias = Literal["lowest", "highest"]
-
-SAMPLES = 1500
-CLIMBERS = 16
-CLIMB_STEPS = 70
-FIRST_STEP_RAD = 0.5
-SHRINK = 0.93
-SEED = 20220315
 
 
 class SideWitness(WitnessDocument):
@@ -115,21 +109,9 @@ class TreePair:
 
     def _climbed(self, side: Side) -> Place:
         sign = 1.0 if side == "highest" else -1.0
-        rng = np.random.default_rng(SEED)
-        lower, upper = self._box
-        q = rng.uniform(lower, upper, (SAMPLES, len(lower)))
-        value = sign * self.ratios(q, side)
-        best = np.argsort(-value)[:CLIMBERS]
-        q, value, step = q[best], value[best], FIRST_STEP_RAD
-        for _ in range(CLIMB_STEPS):
-            tried = np.clip(q + step * rng.normal(size=q.shape), lower, upper)
-            reached = sign * self.ratios(tried, side)
-            better = reached > value
-            q[better], value[better] = tried[better], reached[better]
-            step *= SHRINK
-        at = int(np.argmax(value))
+        q, value = climbed(lambda postures: sign * self.ratios(postures, side), *self._box)
         fraction = 1.0 if side == "highest" else 0.0
-        return Place(tuple(float(x) for x in q[at]), fraction, float(sign * value[at]))
+        return Place(tuple(float(x) for x in q), fraction, sign * value)
 
     @cached_property
     def _box(self) -> tuple[FloatArray, FloatArray]:
