@@ -1,4 +1,4 @@
-// Numerical integration of a plant between two torque jumps.
+// Numerical integration between two jumps of the input.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@
 
 namespace quasilpv {
 
-/// Advances the state of one plant over intervals on which its control torque is constant.
+/// Advances the state of one system over intervals on which its input is constant.
 class Integrator {
  public:
   Integrator() = default;
@@ -26,7 +26,7 @@ class Integrator {
 /// Variable-order, variable-step BDF (SUNDIALS IDA) on the implicit form.
 struct IdaOptions {
   double relative_tolerance = 1e-8;
-  double absolute_tolerance = 1e-10;  ///< see Plant::absolute_tolerance
+  double absolute_tolerance = 1e-10;  ///< see ImplicitSystem::absolute_tolerance
 };
 
 /// The classical fourth-order Runge-Kutta method with constant steps on the explicit form.
@@ -44,9 +44,9 @@ using IntegratorOptions = std::variant<IdaOptions, Rk4Options, MujocoOptions>;
 /// Makes the integrator of one plant, which must outlive it.
 using IntegratorFactory = std::function<std::unique_ptr<Integrator>(const Plant&)>;
 
-/// The integrator a scenario asks for. `plant` must outlive it. INIT-ONLY. Throws PlantError; InputError for one that
+/// The integrator a scenario asks for. `system` must outlive it. INIT-ONLY. Throws PlantError; InputError for one that
 /// is not made here.
-std::unique_ptr<Integrator> make_integrator(const IntegratorOptions& options, const Plant& plant,
+std::unique_ptr<Integrator> make_integrator(const IntegratorOptions& options, const ImplicitSystem& system,
                                             double sample_period_s);
 
 }  // namespace quasilpv

@@ -5,12 +5,12 @@
 
 namespace quasilpv {
 
-/// Integrates y' = f(t, y) (Plant::derivative) with constant steps no longer than `step_s`: an interval is divided into
-/// the smallest number of equal steps that satisfies this. Source: Kutta 1901.
+/// Integrates y' = f(t, y) (ImplicitSystem::derivative) with constant steps no longer than `step_s`: an interval is
+/// divided into the smallest number of equal steps that satisfies this. Source: Kutta 1901.
 class Rk4Integrator final : public Integrator {
  public:
-  /// `plant` must outlive the integrator; `step_s` > 0. INIT-ONLY. Throws InputError.
-  Rk4Integrator(const Plant& plant, double step_s);
+  /// `system` must outlive the integrator; `step_s` > 0. INIT-ONLY. Throws InputError.
+  Rk4Integrator(const ImplicitSystem& system, double step_s);
 
   /// Throws PlantError where the plant does, and if the state leaves the finite numbers.
   void advance(double from_s, double to_s, Eigen::VectorXd& y) override;
@@ -18,7 +18,7 @@ class Rk4Integrator final : public Integrator {
  private:
   void step(double t, double h, Eigen::VectorXd& y);
 
-  const Plant& plant_;
+  const ImplicitSystem& system_;
   double step_s_;
   Eigen::VectorXd state_, stage_, slope_, increment_;
 };

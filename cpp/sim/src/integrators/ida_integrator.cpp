@@ -72,16 +72,16 @@ struct FreeIda {
 template <class Handle, class Free>
 using Owner = std::unique_ptr<std::remove_pointer_t<Handle>, Free>;
 
-int residual(sunrealtype t, N_Vector y, N_Vector y_dot, N_Vector result, void* plant) {
+int residual(sunrealtype t, N_Vector y, N_Vector y_dot, N_Vector result, void* system) {
   VectorView value = view(result);
-  static_cast<const Plant*>(plant)->residual(t, view(y), view(y_dot), value);
+  static_cast<const ImplicitSystem*>(system)->residual(t, view(y), view(y_dot), value);
   return value.allFinite() ? 0 : 1;  // 1: IDA tries a shorter step first
 }
 
 int jacobian(sunrealtype t, sunrealtype c_j, N_Vector y, N_Vector y_dot, N_Vector /*residual*/, SUNMatrix result,
-             void* plant, N_Vector /*scratch*/, N_Vector /*scratch*/, N_Vector /*scratch*/) {
+             void* system, N_Vector /*scratch*/, N_Vector /*scratch*/, N_Vector /*scratch*/) {
   MatrixView value(SUNDenseMatrix_Data(result), SUNDenseMatrix_Rows(result), SUNDenseMatrix_Columns(result));
-  static_cast<const Plant*>(plant)->jacobian(t, c_j, view(y), view(y_dot), value);
+  static_cast<const ImplicitSystem*>(system)->jacobian(t, c_j, view(y), view(y_dot), value);
   return value.allFinite() ? 0 : 1;
 }
 
@@ -97,9 +97,9 @@ SUNContext make_context() {
 
 // Members are destroyed in reverse order: the context after all that was created in it, as SUNDIALS demands.
 struct IdaIntegrator::Solver {
-  Solver(const Plant& the_plant, const IdaOptions& options);
+  Solver(const ImplicitSystem& the_system, const IdaOptions& options);
 
-  const Plant& plant;
+  const ImplicitSystem& system;
   std::string message;  // IDA's own words about its last failure
   Owner<SUNContext, FreeContext> context;
   Owner<N_Vector, FreeVector> y, y_dot;
@@ -112,8 +112,8 @@ struct IdaIntegrator::Solver {
   void count();
 };
 
-IdaIntegrator::Solver::Solver(const Plant& the_plant, const IdaOptions& options) : plant(the_plant) {
-  const int n = plant.size();
+IdaIntegrator::Solver::Solver(const ImplicitSystem& the_system, const IdaOptions& options) : system(the_system) {
+  const int n = system.size();
   context.reset(make_context());
   y.reset(require(make_small_vector(n, context.get()), "N_VNew_Serial"));
   y_dot.reset(require(make_small_vector(n, context.get()), "N_VNew_Serial"));
@@ -125,10 +125,10 @@ IdaIntegrator::Solver::Solver(const Plant& the_plant, const IdaOptions& options)
   check(keep_messages(context.get(), ida.get(), message), "keep_messages");
   check(IDAInit(ida.get(), residual, 0.0, y.get(), y_dot.get()), "IDAInit");
   // IDA hands the pointer back as it got it; the callbacks restore the const.
-  check(IDASetUserData(ida.get(), const_cast<Plant*>(&plant)), "IDASetUserData");
-  view(scratch.get()) = plant.absolute_tolerance(options.absolute_tolerance);
+  check(IDASetUserData(ida.get(), const_cast<ImplicitSystem*>(&system)), "IDASetUserData");
+  view(scratch.get()) = system.absolute_tolerance(options.absolute_tolerance);
   check(IDASVtolerances(ida.get(), options.relative_tolerance, scratch.get()), "IDASVtolerances");
-  view(scratch.get()) = plant.differential();
+  view(scratch.get()) = system.differential();
   check(IDASetId(ida.get(), scratch.get()), "IDASetId");
   check(IDASetSuppressAlg(ida.get(), SUNTRUE), "IDASetSuppressAlg");
   check(IDASetLinearSolver(ida.get(), linear_solver.get(), matrix.get()), "IDASetLinearSolver");
@@ -174,8 +174,8 @@ void IdaIntegrator::Solver::count() {
   statistics.convergence_failures += convergence_failures;
 }
 
-IdaIntegrator::IdaIntegrator(const Plant& plant, const IdaOptions& options)
-    : solver_(std::make_unique<Solver>(plant, options)) {}
+IdaIntegrator::IdaIntegrator(const ImplicitSystem& system, const IdaOptions& options)
+    : solver_(std::make_unique<Solver>(system, options)) {}
 
 IdaIntegrator::~IdaIntegrator() = default;
 
@@ -184,7 +184,7 @@ void IdaIntegrator::advance(double from_s, double to_s, Eigen::VectorXd& y) {
   VectorView state = view(solver.y.get());
   VectorView slope = view(solver.y_dot.get());
   state = y;
-  solver.plant.make_consistent(from_s, state, slope);
+  solver.system.make_consistent(from_s, state, slope);
   solver.message.clear();
   check(IDAReInit(solver.ida.get(), from_s, solver.y.get(), solver.y_dot.get()), "IDAReInit");
   check(IDASetInitStep(solver.ida.get(), kInitialStep), "IDASetInitStep");

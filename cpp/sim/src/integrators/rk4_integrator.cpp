@@ -9,13 +9,13 @@
 
 namespace quasilpv {
 
-Rk4Integrator::Rk4Integrator(const Plant& plant, double step_s)
-    : plant_(plant),
+Rk4Integrator::Rk4Integrator(const ImplicitSystem& system, double step_s)
+    : system_(system),
       step_s_(step_s),
-      state_(plant.size()),
-      stage_(plant.size()),
-      slope_(plant.size()),
-      increment_(plant.size()) {
+      state_(system.size()),
+      stage_(system.size()),
+      slope_(system.size()),
+      increment_(system.size()) {
   if (!std::isfinite(step_s) || step_s <= 0.0) {
     throw InputError("Runge-Kutta integrator", "step", std::to_string(step_s), "a time > 0 s");
   }
@@ -27,7 +27,7 @@ void Rk4Integrator::advance(double from_s, double to_s, Eigen::VectorXd& y) {
   const std::int64_t steps = static_cast<std::int64_t>(std::max(1.0, std::ceil(length / step_s_ * (1.0 - 1e-9))));
   const double h = length / static_cast<double>(steps);
   state_ = y;
-  plant_.make_consistent(from_s, state_, slope_);
+  system_.make_consistent(from_s, state_, slope_);
   for (std::int64_t i = 0; i < steps; ++i) {
     step(from_s + static_cast<double>(i) * h, h, state_);
   }
@@ -38,16 +38,16 @@ void Rk4Integrator::advance(double from_s, double to_s, Eigen::VectorXd& y) {
 }
 
 void Rk4Integrator::step(double t, double h, Eigen::VectorXd& y) {
-  plant_.derivative(t, y, slope_);
+  system_.derivative(t, y, slope_);
   increment_ = slope_;
   stage_ = y + 0.5 * h * slope_;
-  plant_.derivative(t + 0.5 * h, stage_, slope_);
+  system_.derivative(t + 0.5 * h, stage_, slope_);
   increment_ += 2.0 * slope_;
   stage_ = y + 0.5 * h * slope_;
-  plant_.derivative(t + 0.5 * h, stage_, slope_);
+  system_.derivative(t + 0.5 * h, stage_, slope_);
   increment_ += 2.0 * slope_;
   stage_ = y + h * slope_;
-  plant_.derivative(t + h, stage_, slope_);
+  system_.derivative(t + h, stage_, slope_);
   increment_ += slope_;
   y += h / 6.0 * increment_;
 }

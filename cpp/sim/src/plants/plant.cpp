@@ -2,14 +2,14 @@
 
 namespace quasilpv {
 
-Eigen::VectorXd Plant::differential() const { return Eigen::VectorXd::Ones(size()); }
+Eigen::VectorXd ImplicitSystem::differential() const { return Eigen::VectorXd::Ones(size()); }
 
-Eigen::VectorXd Plant::absolute_tolerance(double tolerance) const {
+Eigen::VectorXd ImplicitSystem::absolute_tolerance(double tolerance) const {
   return Eigen::VectorXd::Constant(size(), tolerance);
 }
 
 // NOLINTNEXTLINE(performance-unnecessary-value-param): Eigen passes writable references by value.
-void Plant::make_consistent(double t, Vector y, Vector y_dot) const { derivative(t, y, y_dot); }
+void ImplicitSystem::make_consistent(double t, Vector y, Vector y_dot) const { derivative(t, y, y_dot); }
 
 JointArray Plant::joint_torque(double t) const noexcept {
   JointArray torque = external_.at(t);
