@@ -55,6 +55,33 @@ TEST(Program, computes_each_operation) {
   EXPECT_EQ(evaluate(R"([["angle", 0], ["pow_int", 3]])"), 0.3 * 0.3 * 0.3);
 }
 
+TEST(Program, computes_each_operation_of_signals) {
+  const ProgramScope scope{0, false, false, 3};
+  const auto of_signals = [&](const char* code) {
+    double output = 0.0;
+    parse(code, 1, scope).evaluate({nullptr, nullptr, nullptr, kAngle.data()}, &output);
+    return output;
+  };
+  EXPECT_EQ(of_signals(R"([["signal", 1]])"), -0.7);
+  EXPECT_NEAR(of_signals(R"([["signal", 2], ["log"]])"), std::log(1.1), 1e-15);
+  EXPECT_NEAR(of_signals(R"([["signal", 1], ["tanh"]])"), std::tanh(-0.7), 1e-15);
+  EXPECT_EQ(of_signals(R"([["signal", 1], ["abs"]])"), 0.7);
+  EXPECT_EQ(of_signals(R"([["signal", 0], ["signal", 1], ["min"]])"), -0.7);
+  EXPECT_EQ(of_signals(R"([["signal", 0], ["signal", 1], ["max"]])"), 0.3);
+  EXPECT_EQ(of_signals(R"([["const", 0], ["expm1_quotient"]])"), 1.0);
+  EXPECT_NEAR(of_signals(R"([["signal", 0], ["expm1_quotient"]])"), (std::exp(0.3) - 1.0) / 0.3, 1e-15);
+  EXPECT_EQ(of_signals(R"([["const", 0], ["tanh_quotient"]])"), 1.0);
+  EXPECT_NEAR(of_signals(R"([["signal", 0], ["tanh_quotient"]])"), std::tanh(0.3) / 0.3, 1e-15);
+  EXPECT_EQ(of_signals(R"([["const", 2], ["const", 0], ["log_chord"]])"), 0.5);
+  EXPECT_NEAR(of_signals(R"([["const", 2], ["signal", 0], ["log_chord"]])"), (std::log(2.3) - std::log(2.0)) / 0.3,
+              1e-15);
+  EXPECT_TRUE(std::isnan(of_signals(R"([["const", -1], ["log"], ["const", 1], ["min"]])")));
+  EXPECT_TRUE(std::isnan(of_signals(R"([["const", 1], ["const", -1], ["log"], ["max"]])")));
+  EXPECT_THAT(refusal_of(R"([["angle", 0]])", 1, scope), HasSubstr("operand"));
+  EXPECT_THAT(refusal_of(R"([["signal", 0]])", 1), HasSubstr("operand"));
+  EXPECT_THAT(refusal_of(R"([["signal", 3]])", 1, scope), HasSubstr("[0, 2]"));
+}
+
 TEST(Program, takes_the_deeper_value_as_the_left_operand) {
   EXPECT_EQ(evaluate(R"([["const", 7], ["const", 2], ["add"]])"), 9.0);
   EXPECT_EQ(evaluate(R"([["const", 7], ["const", 2], ["sub"]])"), 5.0);

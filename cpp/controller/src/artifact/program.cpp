@@ -20,6 +20,17 @@ double sinc(double x) noexcept {
   return std::sin(x) / x;
 }
 
+// f(x)/x with value 0 and slope 1 at 0.
+double expm1_quotient(double x) noexcept { return x == 0.0 ? 1.0 : std::expm1(x) / x; }
+double tanh_quotient(double x) noexcept { return x == 0.0 ? 1.0 : std::tanh(x) / x; }
+
+// (log(a + w) - log a)/w.
+double log_chord(double a, double w) noexcept { return w == 0.0 ? 1.0 / a : std::log1p(w / a) / w; }
+
+// NaN if either is.
+double minimum(double x, double y) noexcept { return x < y || std::isnan(x) ? x : y; }
+double maximum(double x, double y) noexcept { return x > y || std::isnan(x) ? x : y; }
+
 double integer_power(double base, int exponent) noexcept {
   double power = base;
   for (int i = 1; i < exponent; ++i) {
@@ -39,11 +50,12 @@ struct Program::Signature {
 };
 
 const Program::Signature* Program::find_signature(const std::string& name) {
-  static constexpr std::array<Signature, 18> kSignatures = {{
+  static constexpr std::array<Signature, 27> kSignatures = {{
       {"const", Op::kConst, 0, true},
       {"angle", Op::kAngle, 0, true},
       {"speed", Op::kSpeed, 0, true},
       {"reference_speed", Op::kReferenceSpeed, 0, true},
+      {"signal", Op::kSignal, 0, true},
       {"neg", Op::kNeg, 1, false},
       {"sin", Op::kSin, 1, false},
       {"cos", Op::kCos, 1, false},
@@ -51,13 +63,21 @@ const Program::Signature* Program::find_signature(const std::string& name) {
       {"acos", Op::kAcos, 1, false},
       {"exp", Op::kExp, 1, false},
       {"sqrt", Op::kSqrt, 1, false},
+      {"log", Op::kLog, 1, false},
+      {"tanh", Op::kTanh, 1, false},
+      {"abs", Op::kAbs, 1, false},
       {"sinc", Op::kSinc, 1, false},
+      {"expm1_quotient", Op::kExpm1Quotient, 1, false},
+      {"tanh_quotient", Op::kTanhQuotient, 1, false},
       {"pow_int", Op::kPowInt, 1, true},
       {"add", Op::kAdd, 2, false},
       {"sub", Op::kSub, 2, false},
       {"mul", Op::kMul, 2, false},
       {"div", Op::kDiv, 2, false},
       {"atan2", Op::kAtan2, 2, false},
+      {"min", Op::kMin, 2, false},
+      {"max", Op::kMax, 2, false},
+      {"log_chord", Op::kLogChord, 2, false},
   }};
   const auto* found = std::find_if(kSignatures.begin(), kSignatures.end(),
                                    [&name](const Signature& signature) { return name == signature.name; });
@@ -77,10 +97,13 @@ Program::Instruction Program::parse_instruction(const Field& field, const Progra
   } else if (signature.op == Op::kPowInt) {
     instruction.index = static_cast<int>(field.at(1).integer(1, kMaxExponent));
   } else if (signature.has_argument) {
-    instruction.index = static_cast<int>(field.at(1).integer(0, scope.joints - 1));
+    const int count = signature.op == Op::kSignal ? scope.signals : scope.joints;
+    instruction.index = static_cast<int>(field.at(1).integer(0, std::max(count, 1) - 1));
   }
-  const bool in_scope =
-      (signature.op != Op::kSpeed || scope.speed) && (signature.op != Op::kReferenceSpeed || scope.reference_speed);
+  const bool in_scope = (signature.op != Op::kAngle || scope.joints > 0) &&
+                        (signature.op != Op::kSpeed || scope.speed) &&
+                        (signature.op != Op::kReferenceSpeed || scope.reference_speed) &&
+                        (signature.op != Op::kSignal || scope.signals > 0);
   if (!in_scope) {
     field.fail("the operand \"" + std::string(signature.name) + "\"", "only the inputs of this program");
   }
@@ -139,6 +162,9 @@ void Program::evaluate(const ProgramInput& input, double* output) const noexcept
       case Op::kReferenceSpeed:
         *next++ = input.reference_speed[instruction.index];
         break;
+      case Op::kSignal:
+        *next++ = input.signal[instruction.index];
+        break;
       case Op::kNeg:
         next[-1] = -next[-1];
         break;
@@ -159,6 +185,21 @@ void Program::evaluate(const ProgramInput& input, double* output) const noexcept
         break;
       case Op::kSqrt:
         next[-1] = std::sqrt(next[-1]);
+        break;
+      case Op::kLog:
+        next[-1] = std::log(next[-1]);
+        break;
+      case Op::kTanh:
+        next[-1] = std::tanh(next[-1]);
+        break;
+      case Op::kAbs:
+        next[-1] = std::abs(next[-1]);
+        break;
+      case Op::kExpm1Quotient:
+        next[-1] = expm1_quotient(next[-1]);
+        break;
+      case Op::kTanhQuotient:
+        next[-1] = tanh_quotient(next[-1]);
         break;
       case Op::kSinc:
         next[-1] = sinc(next[-1]);
@@ -185,6 +226,18 @@ void Program::evaluate(const ProgramInput& input, double* output) const noexcept
       case Op::kAtan2:
         --next;
         next[-1] = std::atan2(next[-1], next[0]);
+        break;
+      case Op::kMin:
+        --next;
+        next[-1] = minimum(next[-1], next[0]);
+        break;
+      case Op::kMax:
+        --next;
+        next[-1] = maximum(next[-1], next[0]);
+        break;
+      case Op::kLogChord:
+        --next;
+        next[-1] = log_chord(next[-1], next[0]);
         break;
     }
   }

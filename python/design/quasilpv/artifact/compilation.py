@@ -11,6 +11,8 @@ from sympy.core.sorting import default_sort_key
 
 from quasilpv.documents.programs import MAX_LENGTH, MAX_POWER, MAX_STACK, OPERATIONS, Program
 from quasilpv.errors import InputError
+from quasilpv.systems.intervals.chords import Ramp, log_chord
+from quasilpv.systems.intervals.quotients import expm1_quotient, tanh_quotient
 
 Instruction = tuple[str] | tuple[str, int] | tuple[str, float]
 
@@ -51,8 +53,16 @@ class _Compiler:
         sympy.acos: "acos",
         sympy.exp: "exp",
         sympy.sinc: "sinc",
+        sympy.log: "log",
+        sympy.tanh: "tanh",
+        sympy.Abs: "abs",
         sympy.atan2: "atan2",
+        expm1_quotient: "expm1_quotient",
+        tanh_quotient: "tanh_quotient",
+        log_chord: "log_chord",
     }
+    _FOLDED: Mapping[Any, str] = {sympy.Min: "min", sympy.Max: "max"}
+    _WITH_CONSTANT: Mapping[Any, tuple[float, str]] = {Ramp: (0.0, "max"), sympy.atan: (1.0, "atan2")}
 
     def __init__(self, inputs: Mapping[sympy.Symbol, tuple[str, int]], field: str, code: list[Instruction]) -> None:
         self._inputs = inputs
@@ -74,13 +84,16 @@ class _Compiler:
             for argument in node.args:
                 self.emit(argument)
             self._code.append((self._FUNCTIONS[node.func],))
+        elif node.func in self._FOLDED:
+            self._emit_factors(sorted(node.args, key=default_sort_key), self._FOLDED[node.func])
+        elif node.func in self._WITH_CONSTANT:
+            number, name = self._WITH_CONSTANT[node.func]
+            self.emit(node.args[0])
+            self._code.extend([("const", number), (name,)])
         elif node.func is sympy.tan:
             self.emit(sympy.sin(node.args[0]))
             self.emit(sympy.cos(node.args[0]))
             self._code.append(("div",))
-        elif node.func is sympy.atan:
-            self.emit(node.args[0])
-            self._code.extend([("const", 1.0), ("atan2",)])
         else:
             known = map(str, self._inputs) if node.is_Symbol else OPERATIONS
             raise InputError("program", self._field, node, f"one of {', '.join(known)}")
@@ -113,11 +126,11 @@ class _Compiler:
             self._emit_factors(denominator)
             self._code.append(("div",))
 
-    def _emit_factors(self, factors: Sequence[sympy.Expr]) -> None:
+    def _emit_factors(self, factors: Sequence[sympy.Expr], operation: str = "mul") -> None:
         self.emit(factors[0])
         for factor in factors[1:]:
             self.emit(factor)
-            self._code.append(("mul",))
+            self._code.append((operation,))
 
     def _emit_power(self, base: sympy.Expr, exponent: sympy.Expr) -> None:
         if exponent.could_extract_minus_sign():

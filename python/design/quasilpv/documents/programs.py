@@ -7,6 +7,7 @@ the order of the list on a stack of at most ``MAX_STACK`` values; what remains o
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
@@ -23,12 +24,25 @@ MAX_STACK = 64
 MAX_LENGTH = 4096
 MAX_POWER = 16
 MAX_JOINTS = 7
+MAX_SIGNALS = 128
 
 
 def sinc(x: Any) -> Any:
     """Return ``sin(x)/x``, 1 at 0 (not the normalised ``numpy.sinc``); elementwise, any shape."""
     safe = np.where(x == 0.0, 1.0, x)
     return np.where(x == 0.0, 1.0, np.sin(safe) / safe)
+
+
+def quotient(function: Callable[[Any], Any], x: Any) -> Any:
+    """Return ``function(x)/x``, 1 at 0, of a function with value 0 and slope 1 there; elementwise, any shape."""
+    safe = np.where(x == 0.0, 1.0, x)
+    return np.where(x == 0.0, 1.0, function(safe) / safe)
+
+
+def log_chord(a: Any, w: Any) -> Any:
+    """Return ``(log(a + w) - log a)/w``, ``1/a`` at w = 0; elementwise, any shape."""
+    safe = np.where(w == 0.0, 1.0, w)
+    return np.where(w == 0.0, 1.0 / a, np.log1p(safe / a) / safe)
 
 
 def integer_power(base: Any, exponent: int) -> Any:
@@ -51,11 +65,14 @@ class Operation:
     function: Callable[..., Any] | None = None
 
 
-INPUTS = ("angle", "speed", "reference_speed")
+JOINT_INPUTS = ("angle", "speed", "reference_speed")
+INPUTS = (*JOINT_INPUTS, "signal")
+"""What programs read: values of joints, in artifacts of robots; signals by number, in artifacts of systems."""
 
 OPERATIONS: Mapping[str, Operation] = {
     "const": Operation(0, "number"),
-    **{name: Operation(0, "joint") for name in INPUTS},
+    **{name: Operation(0, "joint") for name in JOINT_INPUTS},
+    "signal": Operation(0, "signal"),
     "neg": Operation(1, None, np.negative),
     "sin": Operation(1, None, np.sin),
     "cos": Operation(1, None, np.cos),
@@ -63,19 +80,28 @@ OPERATIONS: Mapping[str, Operation] = {
     "acos": Operation(1, None, np.arccos),
     "exp": Operation(1, None, np.exp),
     "sqrt": Operation(1, None, np.sqrt),
+    "log": Operation(1, None, np.log),
+    "tanh": Operation(1, None, np.tanh),
+    "abs": Operation(1, None, np.abs),
     "sinc": Operation(1, None, sinc),
+    "expm1_quotient": Operation(1, None, functools.partial(quotient, np.expm1)),
+    "tanh_quotient": Operation(1, None, functools.partial(quotient, np.tanh)),
     "pow_int": Operation(1, "power", integer_power),
     "add": Operation(2, None, np.add),
     "sub": Operation(2, None, np.subtract),
     "mul": Operation(2, None, np.multiply),
     "div": Operation(2, None, np.divide),
     "atan2": Operation(2, None, np.arctan2),
+    "min": Operation(2, None, np.minimum),
+    "max": Operation(2, None, np.maximum),
+    "log_chord": Operation(2, None, log_chord),
 }
 
 
 _ARGUMENTS: Mapping[str, tuple[tuple[type, ...], float, float, str]] = {
     "number": ((int, float), -LARGEST_NUMBER, LARGEST_NUMBER, f"one number of at most {LARGEST_NUMBER:g} as argument"),
     "joint": ((int,), 0, MAX_JOINTS - 1, f"one joint index from 0 to {MAX_JOINTS - 1} as argument"),
+    "signal": ((int,), 0, MAX_SIGNALS - 1, f"one number of a signal from 0 to {MAX_SIGNALS - 1} as argument"),
     "power": ((int,), 1, MAX_POWER, f"one integer exponent from 1 to {MAX_POWER} as argument"),
 }
 
@@ -102,7 +128,7 @@ class Program(StrictModel):
         return self
 
     def inputs(self) -> dict[str, int]:
-        """Return, for each of ``INPUTS`` the program reads, the highest joint index it uses."""
+        """Return, for each of ``INPUTS`` the program reads, the highest index it uses."""
         highest: dict[str, int] = {}
         for instruction in self.code:
             name = instruction[0]
@@ -156,7 +182,30 @@ def evaluate(
         if array.ndim == 0 or len(array) <= highest:
             raise InputError("program", variable, f"shape {array.shape}", f"at least {highest + 1} joints")
         arrays[variable] = array
-    samples = np.asarray(angle, dtype=np.float64).shape[1:]
+    return _evaluate(program, arrays, np.asarray(angle, dtype=np.float64).shape[1:])
+
+
+def evaluate_signals(program: Program, signals: npt.ArrayLike) -> FloatArray:
+    """Evaluate a program of signals.
+
+    Args:
+        program: what to evaluate.
+        signals: their values, (count,) or (count, samples).
+
+    Returns:
+        As `evaluate`.
+
+    Raises:
+        InputError: the program reads something else, or more signals.
+    """
+    values = np.asarray(signals, dtype=np.float64)
+    for variable, highest in program.inputs().items():
+        if variable != "signal" or len(values) <= highest:
+            raise InputError("program", variable, f"{len(values)} signals", f"at least {highest + 1}, and no joints")
+    return _evaluate(program, {"signal": values}, values.shape[1:])
+
+
+def _evaluate(program: Program, arrays: Mapping[str, FloatArray], samples: tuple[int, ...]) -> FloatArray:
     stack: list[Any] = []
     with np.errstate(all="ignore"):
         for instruction in program.code:

@@ -12,11 +12,12 @@ class Field;
 inline constexpr int kMaxProgramStack = 64;
 inline constexpr int kMaxProgramLength = 4096;
 
-/// Joint values a program may read; each points to `joints` values, or is null if the program does not read it.
+/// Values a program may read: of joints, each `joints` many, or signals; null if the program does not read them.
 struct ProgramInput {
   const double* angle = nullptr;            ///< measured angles, rad
   const double* speed = nullptr;            ///< estimated or filtered speeds, rad/s
   const double* reference_speed = nullptr;  ///< rad/s
+  const double* signal = nullptr;           ///< of a general system, by number
 };
 
 /// The operands a program is allowed to use.
@@ -24,6 +25,7 @@ struct ProgramScope {
   int joints = 0;
   bool speed = false;
   bool reference_speed = false;
+  int signals = 0;  ///< of a general system, which has no joints
 };
 
 /// A vector-valued function in postfix form. Immutable; valid by construction: its stack neither under- nor overflows,
@@ -48,6 +50,7 @@ class Program {
     kAngle,
     kSpeed,
     kReferenceSpeed,
+    kSignal,
     kNeg,
     kSin,
     kCos,
@@ -55,18 +58,26 @@ class Program {
     kAcos,
     kExp,
     kSqrt,
+    kLog,
+    kTanh,
+    kAbs,
     kSinc,
+    kExpm1Quotient,
+    kTanhQuotient,
     kPowInt,
     kAdd,
     kSub,
     kMul,
     kDiv,
-    kAtan2
+    kAtan2,
+    kMin,
+    kMax,
+    kLogChord
   };
 
   struct Instruction {
     Op op;
-    int index;     ///< joint of an operand, exponent of pow_int
+    int index;     ///< joint or signal of an operand, exponent of pow_int
     double value;  ///< of a constant
   };
 

@@ -19,14 +19,6 @@ from quasilpv.certificate.exact.trigonometric import Polynomial, UnsupportedErro
 Scalar = Any
 Code = Sequence[Sequence[Any]]
 
-_BINARY: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
-    "add": operator.add,
-    "sub": operator.sub,
-    "mul": operator.mul,
-    "div": operator.truediv,
-}
-
-
 SINC_RADIUS = 0.01
 """Wider balls are taken apart: the enclosure of sinc is that of a slope times the radius."""
 
@@ -44,6 +36,46 @@ def _sinc(x: Scalar) -> Scalar:
     return functools.reduce(arb.union, parts)
 
 
+def _quotient(name: str, slope: Callable[[Scalar], Scalar]) -> Callable[[Scalar], Scalar]:
+    """``f(x)/x`` with value 0 and slope 1 at 0: near 0, where a ball holds 0, by the mean value theorem its slopes."""
+
+    def apply(x: Scalar) -> Scalar:
+        if not isinstance(x, arb):
+            safe = np.where(x == 0.0, 1.0, x)
+            return np.where(x == 0.0, 1.0, getattr(np, name)(safe) / safe)
+        return slope(x.union(arb(0))) if x.contains(0) else getattr(x, name)() / x
+
+    return apply
+
+
+def _of_two(x: Scalar, y: Scalar, name: str) -> Scalar:
+    """The smaller or the larger one; where balls overlap, of every pair in them."""
+    if not isinstance(x, arb):
+        return np.minimum(x, y) if name == "min" else np.maximum(x, y)
+    ends = [(x.lower(), arb(y).lower()), (x.upper(), arb(y).upper())]
+    low, high = (a if bool(a <= b) == (name == "min") else b for a, b in ends)
+    return low.union(high)
+
+
+def log_chord(a: Scalar, w: Scalar) -> Scalar:
+    """``(log(a + w) - log a)/w``; near w = 0 by the mean value theorem a value of ``1/x`` between a and a + w."""
+    if not isinstance(w, arb):
+        safe = np.where(w == 0.0, 1.0, w)
+        return np.where(w == 0.0, 1.0 / a, np.log1p(safe / a) / safe)
+    return 1 / arb(a).union(a + w) if w.contains(0) else (1 + w / a).log() / w
+
+
+_BINARY: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
+    "div": operator.truediv,
+    "min": lambda x, y: _of_two(x, y, "min"),
+    "max": lambda x, y: _of_two(x, y, "max"),
+    "log_chord": log_chord,
+}
+
+
 def _unary(name: str) -> Callable[[Scalar], Scalar]:
     def apply(x: Scalar) -> Scalar:
         if isinstance(x, Polynomial) and not hasattr(x, name):
@@ -56,26 +88,33 @@ def _unary(name: str) -> Callable[[Scalar], Scalar]:
 _UNARY: Mapping[str, Callable[[Scalar], Scalar]] = {
     "neg": operator.neg,
     "sinc": _sinc,
-    **{name: _unary(name) for name in ("sin", "cos", "exp", "sqrt")},
+    "abs": operator.abs,
+    "expm1_quotient": _quotient("expm1", lambda x: x.exp()),
+    "tanh_quotient": _quotient("tanh", lambda x: 1 - x.tanh() ** 2),
+    **{name: _unary(name) for name in ("sin", "cos", "exp", "sqrt", "log", "tanh")},
 }
 
 
-def program_values(code: Code, angle: Sequence[Scalar], speed: Sequence[Scalar]) -> list[Scalar]:
-    """Outputs of a program at angles and speeds.
+def program_values(
+    code: Code, angle: Sequence[Scalar] = (), speed: Sequence[Scalar] = (), signal: Sequence[Scalar] = ()
+) -> list[Scalar]:
+    """Outputs of a program at angles and speeds, or at signals.
 
     Args:
         code: of a program of an artifact, or of a part of one that leaves values on the stack.
         angle, speed: n values each, all of one kind: numbers, arrays of one shape, `flint.arb` balls, or polynomials.
+        signal: instead of these, values by number.
 
     Raises:
-        KeyError: an operation that no premise of an arm needs (arcs), or a reference.
+        KeyError: an operation that no premise needs (arcs), or a reference.
         UnsupportedError: of polynomials, what is none.
     """
-    inputs = {"angle": angle, "speed": speed}
+    inputs = {"angle": angle, "speed": speed, "signal": signal}
+    zero = 0 * (*angle, *signal)[0]
     stack: list[Scalar] = []
     for name, *argument in code:
         if name == "const":
-            stack.append(0 * angle[0] + float(argument[0]))
+            stack.append(zero + float(argument[0]))
         elif name in inputs:
             stack.append(inputs[name][int(argument[0])])
         elif name == "pow_int":
