@@ -18,11 +18,12 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from flint import arb, fmpq
+from flint import fmpq
 
 from quasilpv.certificate.exact.claims import Claim
 from quasilpv.certificate.exact.matrices import identity, stack, zero
-from quasilpv.certificate.exact.program_values import Code, program_values
+from quasilpv.certificate.exact.program_ranges import outputs_of, range_claim
+from quasilpv.certificate.exact.program_values import program_values
 from quasilpv.certificate.exact.trigonometric import Polynomial, UnsupportedError
 from quasilpv.certificate.exact.vertex_tables import VertexTable
 from quasilpv.certificate.reading import Shipped
@@ -38,72 +39,25 @@ SCHEDULE = "schedule"
 ROUNDING = 1e-9
 ROUNDING_EXACTLY = fmpq(1, 10**9)
 STATES = 64
-LARGEST_SUBDIVISION = 200_000
 _SEED = 2022
 
 
 def premise_box_claims(shipped: Shipped[Any], table: VertexTable, name: str = SCHEDULE) -> list[Claim]:
     """The claims that the outputs of a program, of angles and speeds, stay in the box of a table."""
     domain = [*shipped.artifact.domain.angle_rad, *shipped.artifact.domain.speed_rad_s]
-    outputs = _outputs(shipped.program(name).code)
+    outputs = outputs_of(shipped.program(name).code)
     if len(outputs) != len(table.lower):
         raise ValueError(f"{len(outputs)} outputs of the program {name}, {len(table.lower)} premises")
+    n = len(domain) // 2
     return [
-        _premise_claim(f"output {p} of {name}", output, domain, (table.lower[p], table.upper[p]))
+        range_claim(
+            f"premise box: output {p} of {name} on the operating domain",
+            output,
+            {"angle": domain[:n], "speed": domain[n:]},
+            (table.lower[p], table.upper[p]),
+        )
         for p, output in enumerate(outputs)
     ]
-
-
-def _outputs(program: Code) -> list[Code]:
-    """The program taken apart, one for each output: the shortest final pieces that leave one value each."""
-    pops = {"const": 0, "angle": 0, "speed": 0, "add": 2, "sub": 2, "mul": 2, "div": 2}
-    code = list(program)
-    pieces: list[Code] = []
-    while code:
-        missing, start = 1, len(code)
-        while missing:
-            start -= 1
-            missing += pops.get(code[start][0], 1) - 1
-        pieces.append(code[start:])
-        del code[start:]
-    return pieces[::-1]
-
-
-def _premise_claim(output: str, code: Code, domain: Sequence[Sequence[float]], box: tuple[float, float]) -> Claim:
-    """Subdivide the domain until every piece is seen to stay inside the box, or the middle of one to be outside.
-
-    Only inputs that occur are divided.
-    """
-    used = sorted({int(op[1]) + (len(domain) // 2 if op[0] == "speed" else 0) for op in code if op[0] in _INPUTS})
-    pending = [[(float(low), float(high)) for low, high in domain]]
-    title = f"premise box: {output} on the operating domain"
-    for _ in range(LARGEST_SUBDIVISION):
-        if not pending:
-            return Claim.enclosed(title, holds=True, margin=1.0)
-        piece = pending.pop()
-        value = _enclosure(code, piece)
-        if value.lower() >= box[0] and value.upper() <= box[1]:
-            continue
-        middle = _enclosure(code, [((low + high) / 2.0,) * 2 for low, high in piece])
-        if middle.upper() < box[0] or middle.lower() > box[1]:
-            break
-        widths = {k: (piece[k][1] - piece[k][0]) / (domain[k][1] - domain[k][0]) for k in used}
-        widest = max(widths, key=lambda k: widths[k])
-        low, high = piece[widest]
-        for half in ((low, (low + high) / 2.0), ((low + high) / 2.0, high)):
-            pending.append([half if k == widest else interval for k, interval in enumerate(piece)])
-    return Claim.enclosed(title, holds=False, margin=-1.0)
-
-
-_INPUTS = ("angle", "speed")
-
-
-def _enclosure(code: Code, piece: Sequence[tuple[float, float]]) -> arb:
-    balls = [arb(low).union(arb(high)) for low, high in piece]
-    n = len(piece) // 2
-    value: arb
-    (value,) = program_values(code, balls[:n], balls[n:])
-    return value
 
 
 def equations_of_motion_claim(shipped: Shipped[Any], E: VertexTable, A: VertexTable) -> Claim:
