@@ -22,6 +22,7 @@ void bind_controller(py::module_& module);
 void bind_simulation(py::module_& module);
 void bind_loop(py::module_& module);
 void bind_tree(py::module_& module);
+void bind_system(py::module_& module);
 
 /// A Python tree (dict, list, tuple, str, bool, None, int, float) as a document. Throws InputError naming the type of
 /// anything else.

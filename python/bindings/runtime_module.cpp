@@ -53,4 +53,5 @@ PYBIND11_MODULE(_runtime, module) {
   bindings::bind_simulation(module);
   bindings::bind_loop(module);
   bindings::bind_tree(module);
+  bindings::bind_system(module);
 }

@@ -9,8 +9,10 @@
 #include "artifact_fixture.hpp"
 #include "counting.hpp"
 #include "quasilpv/controller.hpp"
+#include "quasilpv/system_controller.hpp"
 #include "quasilpv/trajectory.hpp"
 #include "quiet_robot.hpp"
+#include "system_fixture.hpp"
 
 #if QUASILPV_COUNTS_CALLS
 using ::quasilpv::testing::count;
@@ -63,6 +65,7 @@ using ::quasilpv::testing::kPaces;
 using ::quasilpv::testing::make_loop;
 using ::quasilpv::testing::QuietRobot;
 using ::quasilpv::testing::run_control_thread;
+using ::quasilpv::testing::system_table;
 using ::quasilpv::testing::with_chain;
 
 class Allocation : public ::testing::Test {
@@ -111,6 +114,19 @@ TEST_F(Allocation, does_not_happen_in_10000_steps_of_any_law_whatever_the_input)
                 kMeasurementInvalid | kReferenceInvalid | kPremiseOutsideBox);
     }
   }
+}
+
+TEST_F(Allocation, does_not_happen_in_the_steps_of_a_general_system_whatever_the_state) {
+  SystemController controller(SystemArtifact::parse(json_twin(system_table()), "test"));
+  std::uint32_t flags = 0;
+  const int count = calls_in([&] {
+    for (int k = 0; k < 10000; ++k) {
+      const double state[2] = {k % 17 == 0 ? std::numeric_limits<double>::quiet_NaN() : 1.0 + 3e-4 * k, 0.1};
+      flags |= controller.step(state, nullptr).flags;
+    }
+  });
+  EXPECT_EQ(count, 0);
+  EXPECT_EQ(flags, kSignalInvalid | kSystemPremiseOutside | kInputSaturated | kOutsideRegion);
 }
 
 TEST_F(Allocation, does_not_happen_in_laws_with_a_chain_of_bodies_whether_limits_act_or_not) {

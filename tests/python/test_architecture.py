@@ -27,7 +27,7 @@ LAYERS = (
     {"synthesis"},
     {"artifact"},
     {"descriptions"},
-    {"trajectories", "_runtime", "release"},
+    {"trajectories", "_runtime", "release", "system_release"},
     {"scenarios"},
     {"telemetry"},
     {"experiments"},

@@ -1,6 +1,6 @@
 """The C++ runtime library. All arrays are of double; joint arrays have shape (joints,), SI units."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -239,3 +239,32 @@ def run_closed_loop(
 
     `advance(from_s, to_s, state, torque)` integrates the plant instead of the scenario's integrator.
     """
+
+class SystemArtifact:
+    """The controller of a general system, validated."""
+
+    @staticmethod
+    def load(path: str) -> SystemArtifact: ...
+    @staticmethod
+    def parse(data: bytes, source: str = ...) -> SystemArtifact: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def hash(self) -> str: ...
+
+class SystemController:
+    """``u = K(z) x_d``, limited, one call per sample."""
+
+    def __init__(self, artifact: SystemArtifact) -> None: ...
+    def reset(self) -> None: ...
+    def step(self, state: npt.ArrayLike, parameter: npt.ArrayLike) -> dict[str, Any]: ...
+
+def simulate_system(
+    artifact: SystemArtifact,
+    start: Sequence[float],
+    parameter: Sequence[float],
+    samples: int,
+    rk4_steps: int,
+    tolerance: float,
+    delay_s: float,
+) -> dict[str, Any]: ...

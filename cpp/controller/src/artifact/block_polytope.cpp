@@ -192,6 +192,26 @@ double BlockPolytope::corner_weight(const Block& block, std::size_t corner, cons
   return weight;
 }
 
+// NOLINTNEXTLINE(performance-unnecessary-value-param): Eigen passes writable references by value.
+bool BlockPolytope::evaluate_sized(double* premise, Eigen::Ref<Eigen::MatrixXd> value) const noexcept {
+  const bool outside = clamp(premise);
+  if (is_affine_) {
+    value = centre_value_;
+    for (std::size_t p = 0; p < slopes_.size(); ++p) {
+      value += (premise[p] - centre_[p]) * slopes_[p];
+    }
+    return outside;
+  }
+  value.setZero();
+  for (const Block& block : blocks_) {
+    const std::size_t corners = std::size_t{1} << block.premises.size();
+    for (std::size_t corner = 0; corner < corners; ++corner) {
+      value += corner_weight(block, corner, premise) * vertices_[block.first_vertex + corner];
+    }
+  }
+  return outside;
+}
+
 bool BlockPolytope::clamp(double* premise) const noexcept {
   bool outside = false;
   for (std::size_t p = 0; p < centre_.size(); ++p) {

@@ -30,7 +30,8 @@ class Record {
 
   /// Next sample of a column of width 1, or of the width of `value`'s leading joints. RT-UNSAFE (may allocate).
   void append(std::size_t column, double value) { columns_[column].values.push_back(value); }
-  void append(std::size_t column, const JointArray& value);
+  void append(std::size_t column, const JointArray& value) { append(column, value.data()); }
+  void append(std::size_t column, const double* values);  ///< as many as the column is wide
 
   const std::vector<Column>& columns() const noexcept { return columns_; }
 

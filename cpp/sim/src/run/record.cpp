@@ -33,9 +33,9 @@ void Record::reserve(std::size_t samples) {
   }
 }
 
-void Record::append(std::size_t column, const JointArray& value) {
+void Record::append(std::size_t column, const double* values) {
   Column& target = columns_[column];
-  target.values.insert(target.values.end(), value.begin(), value.begin() + static_cast<std::ptrdiff_t>(target.width));
+  target.values.insert(target.values.end(), values, values + target.width);
 }
 
 const Record::Column& Record::operator[](const std::string& name) const {

@@ -21,8 +21,10 @@ def inspect_command(
       design inspect out/arm3/artifact.json
     """
     from quasilpv.artifact import read_artifact, summary
+    from quasilpv.artifact.system_store import read_system_artifact, system_summary
 
-    contents = summary(read_artifact(artifact))
+    system = read_system_artifact(artifact)
+    contents = summary(read_artifact(artifact)) if system is None else system_summary(system)
     if json:
         print_json(contents)
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,13 +19,21 @@ from quasilpv.cli.options import (
     require_controller,
     robot_named,
 )
+from quasilpv.cli.parameters import SetOption
+from quasilpv.cli.systems import names_a_system, numbers_by_name, print_system, write_system
+from quasilpv.errors import InputError
 from quasilpv.files import claim_folder
 from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, DesignRequest
 
 
 def synth_command(
     robot_id: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="Robot id, see design list, or a robot.toml: design robot show.")
+        str,
+        typer.Argument(
+            metavar="ROBOT|SYSTEM",
+            help="A robot of design list, or a robot.toml: design robot show. Or a system: of design list, FILE.json,"
+            " or FILE.py:NAME, which executes the code in FILE.py.",
+        ),
     ],
     *,
     controller: Annotated[
@@ -41,6 +50,37 @@ def synth_command(
             "--allow-unverified", help="Write a design that fails its certificate or its gate; the artifact says so."
         ),
     ] = False,
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            "--objective", help="Of a system: largest-region, fastest or least-gain.  [default: largest-region]"
+        ),
+    ] = None,
+    decay: Annotated[
+        float | None,
+        typer.Option("--decay", help="Of a system: decay rate, 1/s.  [default: a tenth of its own rate]"),
+    ] = None,
+    input_limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input-limit", metavar="NAME=VALUE", help="Of a system: largest deviation of an input; may be repeated."
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option("--speed", help="Of a system: bound of the closed loop, 1/s.  [default: what the rate allows]"),
+    ] = None,
+    share: Annotated[
+        float | None,
+        typer.Option(
+            "--share", help="Of a system: part of the domain that fastest and least-gain cover.  [default: 0.5]"
+        ),
+    ] = None,
+    set_: SetOption = None,
+    allow_unproved_rate: Annotated[
+        bool,
+        typer.Option("--allow-unproved-rate", help="Of a system: release a sampling rate that is not proved."),
+    ] = False,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="DIR", help="Folder for both twins.  [default: out/ID]")
     ] = None,
@@ -51,12 +91,55 @@ def synth_command(
     Exit code 1, and nothing written, if no design meets the specification, if an inequality does not hold in exact
     arithmetic, if the robust gate is not passed, or if the torque or slew limits cannot deliver what the design needs.
 
+    Of a system the controller comes with the largest region inside its domain and its input limits that no solution
+    leaves, exact; exit code 1 too if the sampling rate is not proved to keep it.
+
     \b
-    Example:
+    Examples:
       design synth arm3 --rate-hz 2000 -o out/arm3-2khz
+      design synth examples/systems/cart_pole.py:cart_pole --decay 1 --input-limit u=60 -o out/cart_pole
     """
+    of_systems = {
+        "--objective": objective,
+        "--decay": decay,
+        "--input-limit": input_limit,
+        "--speed": speed,
+        "--share": share,
+        "--set": set_,
+        "--allow-unproved-rate": allow_unproved_rate or None,
+    }
+    if names_a_system(robot_id):
+        of_robots = {
+            "--encoder-bits": encoder_bits,
+            "--margin-spare": margin_spare,
+            "--torque-activity": torque_activity,
+            "--allow-unverified": allow_unverified or None,
+            "--design": None if controller == DEFAULT_CONTROLLER else controller,
+        }
+        _refuse(of_robots, robot_id, "a robot")
+        wanted = {
+            "objective": objective,
+            "decay_rate": decay,
+            "input_limits": numbers_by_name("--input-limit", input_limit) or None,
+            "rate_hz": rate_hz,
+            "speed": speed,
+            "share": share,
+        }
+        made = write_system(
+            robot_id,
+            out,
+            parameters=numbers_by_name("--set", set_),
+            allow_unproved_rate=allow_unproved_rate,
+            **{name: value for name, value in wanted.items() if value is not None},
+        )
+        if json:
+            print_json(made)
+        else:
+            print_system(made)
+        return
+    _refuse(of_systems, robot_id, "a system")
     source = robot_named(robot_id)
-    wanted = requested(
+    request = requested(
         source,
         require_controller(controller),
         rate_hz,
@@ -66,11 +149,18 @@ def synth_command(
     )
     folder = out or Path("out") / source.id
     claim_folder(folder)
-    answer = write_released(wanted, folder, allow_unverified=allow_unverified)
+    answer = write_released(request, folder, allow_unverified=allow_unverified)
     if json:
         print_json(answer)
     else:
         print_released(answer)
+
+
+def _refuse(options: Mapping[str, object], name: str, kind: str) -> None:
+    """InputError if an option is given that the other kind of thing has."""
+    for option, value in options.items():
+        if value is not None:
+            raise InputError("command line", option, value, f"nothing: {name} is not {kind}, which it is for")
 
 
 def write_released(request: DesignRequest, out: Path, *, allow_unverified: bool = False) -> dict[str, Any]:

@@ -25,9 +25,15 @@ def verify_command(
       design verify out/arm3/artifact.json
     """
     from quasilpv.artifact import read_artifact
+    from quasilpv.artifact.system_store import read_system_artifact
     from quasilpv.certificate import verify
+    from quasilpv.certificate.systems import verify_system
 
-    verdict = verify(read_artifact(artifact).content(), str(artifact))
+    system = read_system_artifact(artifact)
+    if system is None:
+        verdict = verify(read_artifact(artifact).content(), str(artifact))
+    else:
+        verdict = verify_system(system, str(artifact))
     if json:
         print_json(verdict.to_document())
     else:

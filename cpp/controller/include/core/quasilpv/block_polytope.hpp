@@ -31,6 +31,10 @@ class BlockPolytope {
   template <int Rows, int Columns>
   bool evaluate(double* premise, Eigen::Matrix<double, Rows, Columns>& value) const noexcept;
 
+  /// The same for a matrix whose size is known at load only; `value` has it already.
+  /// RT-SAFE (bounded, no allocation, no lock, no throw).
+  bool evaluate_sized(double* premise, Eigen::Ref<Eigen::MatrixXd> value) const noexcept;
+
   /// Clamps z to the box in place; a premise that is not finite becomes the centre.
   /// RT-SAFE (bounded, no allocation, no lock, no throw).
   /// \param[in,out] premise `premises()` values.

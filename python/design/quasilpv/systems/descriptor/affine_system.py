@@ -46,6 +46,7 @@ class AffineSystem:
             sector coordinates sum to at most 1 (`from_rules`).
         from_formulas: the drift was given as a function of the state, and A(x) is one way among others to write it as
             A(x) x (`from_equations`).
+        trim: the equilibrium that states and inputs are deviations from, (n + m,); empty for the origin.
 
     Raises:
         InputError: the shapes of the parts do not agree, or E has not the form diag(E_1(z), 0).
@@ -65,6 +66,7 @@ class AffineSystem:
     disturbance: tuple[float, ...] = ()
     given_by_rules: bool = False
     from_formulas: bool = False
+    trim: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse parts whose sizes disagree and states in another order than differential, algebraic."""

@@ -69,6 +69,11 @@ class Equilibrium(NamedTuple):
             values = dict(zip(symbols, listed, strict=True))
         return {name: _number(source, f"{field}, {name}", value) for name, value in values.items()}
 
+    def values(self, state: Sequence[sp.Symbol], inputs: Sequence[sp.Symbol]) -> tuple[float, ...]:
+        """As doubles, states and then inputs in the order given; empty for the origin."""
+        found = [self.state.get(name, 0) for name in state] + [self.inputs.get(name, 0) for name in inputs]
+        return tuple(map(float, found)) if any(found) else ()
+
     def of_deviations(self, expression: sp.Expr) -> sp.Expr:
         """An expression of the symbols as one of their deviations from here, which have the same names."""
         shift = {name: name + value for name, value in {**self.state, **self.inputs}.items() if value != 0}

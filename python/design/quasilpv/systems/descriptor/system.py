@@ -90,6 +90,7 @@ class DescriptorSystem(AffineSystem):
         domain: Mapping[sp.Symbol, Bounds] | None = None,
         disturbance: tuple[float, ...] = (),
         from_formulas: bool = False,
+        trim: tuple[float, ...] = (),
     ) -> DescriptorSystem:
         """The system of matrices whose entries have been read; state and domain are those of the names by default."""
         state, domain = state or names.state, names.domain if domain is None else domain
@@ -105,6 +106,7 @@ class DescriptorSystem(AffineSystem):
                     domain=domain,
                     disturbance=disturbance,
                     from_formulas=from_formulas,
+                    trim=trim,
                 )
             left_open.made.append(Made(system, matrices, premises, names.unknown))
             return system
@@ -125,6 +127,7 @@ class DescriptorSystem(AffineSystem):
             domain=dict(domain),
             disturbance=disturbance,
             from_formulas=from_formulas,
+            trim=trim,
         )
 
     @classmethod
@@ -183,6 +186,7 @@ class DescriptorSystem(AffineSystem):
             domain={each: _shifted(name, each, bounds, around) for each, bounds in names.domain.items()},
             disturbance=matrices.d if any(matrices.d) else (),
             from_formulas=True,
+            trim=around.values(matrices.state, names.inputs),
         )
 
     @classmethod

@@ -1,0 +1,1 @@
+"""Conditions for a law and the set of states inside which it is proved to work."""

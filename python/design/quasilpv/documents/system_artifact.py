@@ -1,0 +1,203 @@
+"""The artifact of a general system: a feedback, the region it is proved in, and the plant from the same equations.
+
+``docs/reference/formats.md`` states the members. Signals are numbered: the states, differential ones first, the inputs,
+the parameters, and in programs of the plant the rates of the states after them. Values are deviations from the trim.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from quasilpv.documents.artifact import LONGEST_PERIOD_S, SHORTEST_PERIOD_S, Creator, Name, Sha256
+from quasilpv.documents.canonical import Document, document_hash, with_hash
+from quasilpv.documents.programs import MAX_SIGNALS, Program
+from quasilpv.documents.strict_model import FieldError, NonNegative, Number, Positive, StrictModel
+from quasilpv.documents.tables import Matrix, PolytopeTable, Vector, require_lyapunov, require_shape, require_size
+
+SCHEMA = "quasilpv.system_artifact"
+MAX_STATES = 32
+MAX_INPUTS = 7
+
+Rows = tuple[tuple[float, ...], ...]
+Role = Literal["state", "input", "parameter"]
+
+
+class Signal(StrictModel):
+    """One named signal.
+
+    ``low`` and ``high`` bound its deviation from ``trim``, null where nothing bounds it: of a state the domain, of an
+    input its limits, of a parameter its interval. ``known`` is false for a parameter that the law is not told.
+    """
+
+    name: Name
+    role: Role
+    unit: str
+    low: Number | None
+    high: Number | None
+    trim: Number
+    known: bool
+
+    @model_validator(mode="after")
+    def _check_interval(self) -> Self:
+        if self.low is not None and self.high is not None and not self.low <= self.high:
+            raise FieldError("high", self.high, f"at least low = {self.low}")
+        if self.role == "parameter" and (self.low is None or self.high is None):
+            raise FieldError("low", "null", "an interval of the parameter")
+        return self
+
+
+class AffineDocument(StrictModel):
+    """A matrix affine in the premises: ``X(z) = constant + sum_p z_p coefficients[p]``."""
+
+    constant: Matrix
+    coefficients: tuple[Matrix, ...]
+
+    def require(self, field: str, premises: int, rows: int, columns: int) -> None:
+        """Raise ``FieldError`` unless it has these sizes."""
+        require_size(f"{field}.coefficients", self.coefficients, premises)
+        for name, matrix in (
+            ("constant", self.constant),
+            *((f"coefficients[{i}]", m) for i, m in enumerate(self.coefficients)),
+        ):
+            require_shape(f"{field}.{name}", matrix, rows, columns)
+
+
+class ModelDocument(StrictModel):
+    """``E(z) x' = A(z) x + B(z) u``: ``premises`` computes z from the signals; the first states are differential."""
+
+    differential: int = Field(ge=1, le=MAX_STATES)
+    names: tuple[Name, ...]
+    lower: Vector
+    upper: Vector
+    premises: Program
+    E: AffineDocument
+    A: AffineDocument
+    B: AffineDocument
+
+
+class RegionalFeedback(StrictModel):
+    """``u = K(z) x_d``, z clamped to its box, then u limited."""
+
+    kind: Literal["regional-feedback"]
+    gain: PolytopeTable
+    schedule: Program
+    """As ``premises`` of the model, the centre of the box for what the law is not told."""
+
+
+class RegionDocument(StrictModel):
+    """``x_d' P^-1 x_d <= 1``: no solution leaves it, and inside it every bound of the signals holds."""
+
+    lyapunov: Matrix
+    decay_rate_per_s: NonNegative
+    speed_per_s: Positive | None
+    """Bound of the closed loop in the norm of the region; null if none was asked for."""
+
+
+class PlantDocument(StrictModel):
+    """``F(x', x, u, p) = 0`` from the equations: residual, and per row the partial derivatives by x' and by x."""
+
+    residual: Program
+    jacobian: tuple[Program, ...]
+
+
+class SystemArtifactDocument(StrictModel):
+    """One controller of a general system, immutable. The hash is not stored; it is computed from the content."""
+
+    schema_: Literal["quasilpv.system_artifact"] = Field(alias="schema")
+    schema_version: Literal[1]
+    name: Name
+    creator: Creator
+    design_hash: Sha256
+    sample_period_s: float = Field(ge=SHORTEST_PERIOD_S, le=LONGEST_PERIOD_S)
+    signals: Annotated[tuple[Signal, ...], Field(min_length=1, max_length=MAX_SIGNALS)]
+    model: ModelDocument
+    law: RegionalFeedback
+    region: RegionDocument
+    plant: PlantDocument
+    witness: dict[str, Rows]
+    sampling: dict[str, float | str | None] | None
+    verification: dict[str, object] | None
+
+    def of(self, role: Role) -> tuple[Signal, ...]:
+        """Its signals of one role, in order."""
+        return tuple(signal for signal in self.signals if signal.role == role)
+
+    @property
+    def states(self) -> tuple[Signal, ...]:
+        """Its states, differential ones first."""
+        return self.of("state")
+
+    @property
+    def inputs(self) -> tuple[Signal, ...]:
+        """Its inputs."""
+        return self.of("input")
+
+    @property
+    def parameters(self) -> tuple[Signal, ...]:
+        """Its parameters."""
+        return self.of("parameter")
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the canonical JSON of the content, 64 hexadecimal digits."""
+        return document_hash(self.content())
+
+    def content(self) -> Document:
+        """Return the artifact as a JSON tree without its hash."""
+        return self.model_dump(mode="json", by_alias=True)
+
+    def to_document(self) -> Document:
+        """Return the artifact as a normalised JSON tree, hash included."""
+        return with_hash(self.content())
+
+    def __repr__(self) -> str:
+        """What it is, in a few lines."""
+        states, inputs = (", ".join(signal.name for signal in own) for own in (self.states, self.inputs))
+        rate = f"{1.0 / self.sample_period_s:g} Hz"
+        return f"SystemArtifact({self.name!r}, {inputs} from {states}, {rate}\n  hash={self.hash})"
+
+    def __str__(self) -> str:
+        """The same."""
+        return repr(self)
+
+    @model_validator(mode="after")
+    def _check_consistency(self) -> Self:
+        roles = [signal.role for signal in self.signals]
+        if roles != sorted(roles, key=("state", "input", "parameter").index):
+            raise FieldError("signals", roles, "states first, then inputs, then parameters")
+        names = [signal.name for signal in self.signals]
+        if len(set(names)) != len(names):
+            raise FieldError("signals", names, "names of their own")
+        n, m, r, q = len(self.states), len(self.inputs), len(self.model.names), self.model.differential
+        if not (1 <= n <= MAX_STATES and 1 <= m <= MAX_INPUTS):
+            raise FieldError("signals", f"{n} states and {m} inputs", f"1 to {MAX_STATES} and 1 to {MAX_INPUTS}")
+        if q > n:
+            raise FieldError("model.differential", q, f"at most {n}, the states there are")
+        for field in ("lower", "upper"):
+            require_size(f"model.{field}", getattr(self.model, field), r)
+        for field, columns in (("E", n), ("A", n), ("B", m)):
+            getattr(self.model, field).require(f"model.{field}", r, n, columns)
+        self.law.gain.require_shape("law.gain", m, q)
+        if self.law.gain.lower != self.model.lower or self.law.gain.upper != self.model.upper:
+            raise FieldError("law.gain", "another box", "that of the model's premises")
+        require_lyapunov("region.lyapunov", self.region.lyapunov, q)
+        self._check_programs(n, m, r)
+        return self
+
+    def _check_programs(self, n: int, m: int, r: int) -> None:
+        signals = len(self.signals)
+        require_size("plant.jacobian", self.plant.jacobian, n)
+        rows = [(f"plant.jacobian[{i}]", row, 2 * n, signals + n) for i, row in enumerate(self.plant.jacobian)]
+        for field, program, outputs, readable in (
+            ("model.premises", self.model.premises, r, signals),
+            ("law.schedule", self.law.schedule, r, signals),
+            ("plant.residual", self.plant.residual, n, signals + n),
+            *rows,
+        ):
+            if program.outputs != outputs:
+                raise FieldError(f"{field}.outputs", program.outputs, str(outputs))
+            for variable, highest in program.inputs().items():
+                if variable != "signal" or highest >= readable:
+                    raise FieldError(f"{field}.code", f"{variable} {highest}", f"signals below {readable} only")

@@ -1,0 +1,1 @@
+"""Feedback for general systems, with the region it is proved in: from a request to a design."""

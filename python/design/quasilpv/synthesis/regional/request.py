@@ -1,0 +1,102 @@
+"""What a design of a general system is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from typing import Literal, TypeAlias, get_args
+
+from quasilpv.errors import InputError, one_of
+from quasilpv.systems.descriptor.system import DescriptorSystem
+
+Objective: TypeAlias = Literal["largest-region", "fastest", "least-gain"]
+
+DEFAULT_RATE_HZ = 1000.0
+DEFAULT_SHARE = 0.5
+"""Of the half-widths of the domain, that `fastest` and `least-gain` have to cover."""
+
+
+@dataclass(frozen=True)
+class RegionalRequest:
+    """A system, and what its controller has to do.
+
+    Attributes:
+        system: in deviations from its trim.
+        objective: what is best: ``largest-region`` (the largest ellipsoid in which everything holds), ``fastest`` (the
+            largest decay rate), ``least-gain`` (the smallest input used in the region).
+        decay_rate: alpha with ``V' <= -2 alpha V``, 1/s; not of ``fastest``.
+        input_limits: by name, the largest magnitude of an input's deviation from its trim.
+        rate_hz: of the sampled loop; None: `DEFAULT_RATE_HZ`, or faster if only that is proved.
+        speed: bound of the closed loop in the norm of the region, 1/s; None: whatever results.
+        share: of the half-widths of the domain that the region has to cover, for ``fastest`` and ``least-gain``.
+
+    Raises:
+        InputError: a number is out of range or a name is unknown.
+    """
+
+    system: DescriptorSystem
+    objective: Objective = "largest-region"
+    decay_rate: float | None = None
+    input_limits: Mapping[str, float] = field(default_factory=dict)
+    rate_hz: float | None = None
+    speed: float | None = None
+    share: float = DEFAULT_SHARE
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning."""
+        source = self.system.name
+        if self.objective not in get_args(Objective):
+            raise InputError(source, "objective", self.objective, one_of(get_args(Objective), self.objective))
+        for name, bound in self.input_limits.items():
+            if name not in self.system.inputs:
+                raise InputError(source, "input limit", name, one_of(self.system.inputs, name))
+            if not (isfinite(bound) and bound > 0.0):
+                raise InputError(source, f"input limit {name}", bound, "a finite number > 0")
+        numbers = {"decay": self.decay_rate, "rate": self.rate_hz, "speed": self.speed}
+        for name, value in numbers.items():
+            if value is not None and not (isfinite(value) and value > 0.0):
+                raise InputError(source, name, value, "a finite number > 0")
+        if not 0.0 < self.share < 1.0:
+            raise InputError(source, "share", self.share, "a number between 0 and 1")
+        if not self.system.inputs:
+            raise InputError(source, "inputs", "none", "a system with an input: a design is a feedback")
+        if self.objective == "least-gain" and not self.input_limits:
+            raise InputError(source, "input limit", "none", "one, in units of which least-gain measures the input")
+        if self.objective == "fastest" and self.decay_rate is not None:
+            raise InputError(source, "decay", self.decay_rate, "none: fastest finds it")
+
+    @property
+    def sample_period_s(self) -> float:
+        """T, s."""
+        return 1.0 / (self.rate_hz or DEFAULT_RATE_HZ)
+
+    @property
+    def unbounded(self) -> str | None:
+        """The name of a differential state in whose direction nothing bounds the region; None if something does."""
+        if self.speed is not None or all(isfinite(bound) for bound in self.limits_of_inputs):
+            return None
+        q = self.system.differential
+        named = zip(self.system.state[:q], self.bounds_of_states[:q], strict=True)
+        return next((symbol.name for symbol, bound in named if not isfinite(bound)), None)
+
+    @property
+    def limits_of_inputs(self) -> tuple[float, ...]:
+        """In order; infinite where none is stated."""
+        return tuple(self.input_limits.get(name, inf) for name in self.system.inputs)
+
+    @property
+    def bounds_of_states(self) -> tuple[float, ...]:
+        """Largest magnitude of every state that lies in its domain on both sides; infinite where there is no domain.
+
+        Raises:
+            InputError: the domain of a state does not hold the trim inside.
+        """
+        bounds = []
+        for symbol in self.system.state:
+            low, high = self.system.domain.get(symbol, (-inf, inf))
+            bound = min(-float(low), float(high))
+            if bound <= 0.0:
+                raise InputError(self.system.name, f"domain of {symbol}", (low, high), "the trim inside the interval")
+            bounds.append(bound)
+        return tuple(bounds)
