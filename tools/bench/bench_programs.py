@@ -29,8 +29,9 @@ from quasilpv.scenarios import (
     build_scenario,
     write_scenario,
 )
+from quasilpv.scenarios.registry import tracking_experiment
 from quasilpv.synthesis import DesignRequest, Specification
-from quasilpv.systems.robots.registry import robot
+from quasilpv.systems.robots.registry import any_robot, robot
 from quasilpv.trajectories import serial_square
 from quasilpv.trajectories.document import write_trajectory
 
@@ -107,6 +108,7 @@ class Experiment:
     folder: Path
     trajectory: Path
     scenario: Path
+    robot: str = ROBOT
 
     @classmethod
     def write(cls, folder: Path) -> Experiment:
@@ -119,6 +121,19 @@ class Experiment:
             write_scenario(folder / "scenario.json", build_scenario(arm, square)),
         )
 
+    @classmethod
+    def in_space(cls, folder: Path) -> Experiment:
+        """The same of the circle of the UR5 with its full load."""
+        folder.mkdir(exist_ok=True)
+        circle = tracking_experiment("ur5-circle")
+        scenario = build_scenario(circle.robot, circle.trajectory)
+        return cls(
+            folder,
+            write_trajectory(folder / "trajectory.json", circle.trajectory),
+            write_scenario(folder / "scenario.json", scenario),
+            circle.robot.id,
+        )
+
     @property
     def inputs(self) -> tuple[Path, Path]:
         """Trajectory and scenario, as the programs take them."""
@@ -126,12 +141,14 @@ class Experiment:
 
     def artifact(self, controller: str) -> Path:
         """Write the artifact of a controller at its default specification; a design made before is reused."""
-        design = kept_design(DesignRequest.of(ROBOT, controller, Specification()), folder=ROOT / "out" / "cache")
+        specification = Specification() if self.robot == ROBOT else None
+        request = DesignRequest.of(self.robot, controller, specification)
+        design = kept_design(request, folder=ROOT / "out" / "cache")
         return write_artifact(self.folder / controller, design)[0]
 
     def states(self, count: int) -> Path:
-        """Write random motions within the arm's domain: what inverse dynamics is evaluated at."""
-        domain = robot(ROBOT).domain
+        """Write random motions within the domain of the robot: what inverse dynamics is evaluated at."""
+        domain = any_robot(self.robot).domain
         random = np.random.default_rng(0)
         boxes = {
             "angle": domain.angle_rad,

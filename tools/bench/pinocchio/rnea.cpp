@@ -1,6 +1,6 @@
-// rnea SCENARIO STATES ROUNDS: inverse dynamics of the scenario's planar arm by Pinocchio's recursive Newton-Euler
-// algorithm. The competitor of inverse_dynamics_bench and step_bench; tools/bench/bench_pinocchio.py builds it when it
-// is needed (a minute of compilation), outside the main build.
+// rnea SCENARIO STATES ROUNDS: inverse dynamics of the scenario's arm, planar or in space, by Pinocchio's recursive
+// Newton-Euler algorithm. The competitor of inverse_dynamics_bench and step_bench; tools/bench/bench_pinocchio.py
+// builds it when it is needed (a minute of compilation), outside the main build.
 #include <iostream>
 #include <pinocchio/algorithm/rnea.hpp>
 #include <pinocchio/multibody.hpp>
@@ -32,6 +32,41 @@ pinocchio::Model planar_arm(const nlohmann::json& plant) {
   return model;
 }
 
+Eigen::Matrix3d rows(const nlohmann::json& matrix) {
+  Eigen::Matrix3d result;
+  for (int i = 0; i < 3; ++i) {
+    result.row(i) = to_vector(matrix.at(static_cast<std::size_t>(i)));
+  }
+  return result;
+}
+
+/// A chain about axes of its own, z where that is the axis: the fastest joint Pinocchio has for it.
+pinocchio::Model chain(const nlohmann::json& plant) {
+  pinocchio::Model model;
+  model.gravity.linear() = to_vector(plant.at("gravity_m_s2"));
+  pinocchio::JointIndex parent = 0;
+  for (const nlohmann::json& joint : plant.at("joints")) {
+    if (joint.at("kind") == "prismatic") {
+      throw std::runtime_error("rnea: a joint that slides is not part of this benchmark");
+    }
+    const pinocchio::SE3 placement(rows(joint.at("rotation")), Eigen::Vector3d(to_vector(joint.at("translation_m"))));
+    const Eigen::Vector3d axis = to_vector(joint.at("axis"));
+    const std::string name = joint.at("name").get<std::string>();
+    if (axis == Eigen::Vector3d::UnitZ()) {
+      parent = model.addJoint(parent, pinocchio::JointModelRZ(), placement, name);
+    } else {
+      parent = model.addJoint(parent, pinocchio::JointModelRevoluteUnaligned(axis), placement, name);
+    }
+    const double mass = joint.at("mass_kg").get<double>();
+    const Eigen::Vector3d com = Eigen::Vector3d(to_vector(joint.at("first_moment_kg_m"))) / mass;
+    const Eigen::Matrix3d about_com = rows(joint.at("rotational_kg_m2")) -
+                                      mass * (com.squaredNorm() * Eigen::Matrix3d::Identity() - com * com.transpose());
+    model.appendBodyToJoint(parent, pinocchio::Inertia(mass, com, about_com));
+    model.armature[static_cast<Eigen::Index>(parent) - 1] = joint.at("rotor_inertia_kg_m2").get<double>();
+  }
+  return model;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -40,7 +75,8 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    const pinocchio::Model model = planar_arm(read_json(argv[1]).at("plant"));
+    const nlohmann::json plant = read_json(argv[1]).at("plant");
+    const pinocchio::Model model = plant.at("kind") == "tree" ? chain(plant) : planar_arm(plant);
     pinocchio::Data data(model);
     const std::vector<ArmState> states = read_states(argv[2]);
     const auto torque = [&](const ArmState& state) -> const Eigen::VectorXd& {
