@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -26,6 +27,12 @@ def robot_command(
         Path | None,
         typer.Option("--out", "-o", metavar="FILE", help="Of a description: a robot.toml to fill in."),
     ] = None,
+    trust_xacro: Annotated[
+        bool,
+        typer.Option(
+            "--trust-xacro", help="Evaluate a xacro file, which may run anything; with --out into a URDF beside."
+        ),
+    ] = False,
     prove: Annotated[bool, typer.Option("--prove", help="Prove the range of inertias over all postures.")] = False,
     accept_inertias: Annotated[
         bool, typer.Option("--accept-inertias", help="Take principal moments that no body has as they are.")
@@ -40,20 +47,30 @@ def robot_command(
     \b
     Examples:
       design robot show ur5.urdf -o robot.toml
+      design robot show arm.urdf.xacro --trust-xacro -o robot.toml
       design robot show robot.toml --prove
     """
     from quasilpv.descriptions.robot_file import read_description
+    from quasilpv.descriptions.xacro import expanded
 
     del action
     if file.suffix == ".toml":
-        if tip is not None or out is not None:
-            option = "--tip" if tip is not None else "--out"
+        given = {"--tip": tip is not None, "--out": out is not None, "--trust-xacro": trust_xacro}
+        for option in (name for name, is_given in given.items() if is_given):
             raise InputError("command line", option, option, "nothing with a robot.toml, which says it all")
         return _show_robot(file, prove=prove, accept_inertias=accept_inertias, json=json)
     if prove:
         expected = "a robot.toml, which states what a description lacks: design robot show FILE -o robot.toml"
         raise InputError("command line", "--prove", str(file), expected)
-    _show_description(file, read_description(file), tip, out, json=json)
+    if not trust_xacro:
+        _show_description(file, read_description(file), tip, out, json=json)
+        return 0
+    with TemporaryDirectory() as nowhere:
+        urdf = Path(nowhere) / "robot.urdf" if out is None else out.with_suffix(".urdf")
+        write_atomically({urdf: expanded(file)})
+        _show_description(urdf, read_description(urdf), tip, out, json=json)
+    if out is not None:
+        print_note(f"wrote {urdf}")
     return 0
 
 
