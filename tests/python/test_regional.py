@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -455,3 +456,25 @@ def test_a_damaged_artifact_is_refused_by_both_sides(member: str) -> None:
     if member != "witness":  # which nothing reads at run time
         with pytest.raises(InputError):
             _runtime.SystemArtifact.parse(canonical_json(with_hash(content)))
+
+
+def commands_of(path: Path) -> list[str]:
+    """The commands at the top of an example: the indented ones of its description."""
+    return [line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.startswith("    design ")]
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("path", sorted((EXAMPLES / "systems").glob("*.py")), ids=lambda path: path.stem)
+def test_the_commands_of_an_example_end_in_a_proved_controller_and_a_run_that_stays(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "examples").symlink_to(EXAMPLES)
+    monkeypatch.chdir(tmp_path)
+    synth, simulated = (shlex.split(line)[1:] for line in commands_of(path))
+    assert run([*synth, "--json"]) == 0
+    made = json.loads(capsys.readouterr().out)
+    assert made["sampling"] != "not proved"
+    assert run([*simulated, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["level_at_start"] < 1.0  # the start that the file names is in the region
+    assert answer["final_level"] < 0.01

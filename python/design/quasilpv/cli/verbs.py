@@ -67,6 +67,7 @@ VERBS: Mapping[str, Verb] = {
     "inspect": Verb("inspect", "What is in an artifact."),
     "verify": Verb("verify", "Every inequality again, and what its verdict rests on."),
     "robust": Verb("robust", "The robust gate: every posture, payload, small delay."),
+    "export": Verb("export", "Gains and model of an artifact for other tools: .mat, .npz, .json."),
     "export-sdp": Verb("export_sdp", "The semidefinite program behind a law, as a file."),
     "track": Verb("track", "Scenarios in closed loop: table and figures."),
     "animate": Verb("animate", "Robots in motion, with and without compensation."),
