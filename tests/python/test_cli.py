@@ -132,7 +132,7 @@ def test_when_listed_as_json_expect_robots_controllers_and_scenarios(design: Des
     assert {"arm2", "arm3"} <= {entry["id"] for entry in known["robots"]}
     assert {"pid", "ctc", "ctc-dob", "dob-acceleration"} <= {entry["id"] for entry in known["controllers"]}
     assert {"serial-square", "serial-circle"} <= {entry["id"] for entry in known["scenarios"]}
-    table = design("list").out
+    table = design("list", "--items").out
     assert all(entry["id"] in table for entries in known.values() for entry in entries)
 
 

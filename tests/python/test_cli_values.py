@@ -17,6 +17,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+import quasilpv as ql
 from quasilpv.artifact import write_artifact
 from quasilpv.cli import run
 from quasilpv.cli.usage import LARGEST_WRITTEN, number
@@ -48,6 +49,7 @@ class Call:
 QUESTION = {"--condition": "II.6"}
 ROBOT = str(Path(__file__).parents[1] / "data" / "robots" / "two_links.xml")
 VERB_ARGUMENTS = {
+    "new": Call(("robot", ROBOT)),
     "robot": Call(("show", ROBOT)),
     "demo": Call(stubs=("cli.synth.write_released",)),
     "list": Call(),
@@ -55,9 +57,11 @@ VERB_ARGUMENTS = {
     "inspect": Call(("ARTIFACT",)),
     "verify": Call(("ARTIFACT",)),
     "robust": Call(("ARTIFACT",), stubs=("certificate.gate",)),
+    "export": Call(("ARTIFACT", "x.npz")),
     "export-sdp": Call(("ARTIFACT",), {"--out": "x"}, stubs=("synthesis.shipped_problem.shipped_problem",)),
     "track": Call(("stabilise-arm2",), {"--controller": "pid"}, stubs=("cli.track.run_all",)),
     "animate": Call(("stabilise-arm2",), stubs=("cli.animate.progress",)),
+    "simulate": Call(("SYSTEM",), {"--duration": "0.1"}, stubs=("figures.systems.draw_system_run",)),
     "hil": Call(("serial-square",), {"--controller": "pid", "--real-time": ""}, stubs=("cli.session.Session",)),
     "log": Call(("info", "LAST")),
     "view": Call((), {"--live": "", "--artifact": "ARTIFACT"}, stubs=("view.live.LiveMotion",)),
@@ -76,9 +80,15 @@ class LegitimateError(Exception):
 
 
 @pytest.fixture(scope="module")
-def artifact(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("pid")
-    return write_artifact(folder, release(DesignRequest.of("arm3", "pid", Specification())).artifact)[0]
+def artifacts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Files, by the word that stands for them: a controller of a robot, and one of a system."""
+    robots = tmp_path_factory.mktemp("pid")
+    path, _ = write_artifact(robots, release(DesignRequest.of("arm3", "pid", Specification())).artifact)
+    system = ql.DescriptorSystem.from_equations(
+        ["x' = x^2 + u"], state="x", inputs="u", domain={"x": (-1, 1)}, name="square"
+    )
+    made = ql.stabilise(system, decay_rate=1.0, input_limits={"u": 5.0})
+    return {"ARTIFACT": str(path), "SYSTEM": str(made.write(tmp_path_factory.mktemp("square")))}
 
 
 @pytest.fixture(autouse=True)
@@ -145,7 +155,7 @@ def test_every_verb_is_called_here() -> None:
 def test_when_a_value_is_no_usable_number_or_nothing_expect_one_line_or_the_work_begun(
     option: Option,
     values: tuple[str, ...],
-    artifact: Path,
+    artifacts: dict[str, str],
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -157,7 +167,7 @@ def test_when_a_value_is_no_usable_number_or_nothing_expect_one_line_or_the_work
     for stub in call.stubs:
         monkeypatch.setattr(f"quasilpv.{stub}", begin)
     others = [word for name, value in call.options.items() if name != option.name for word in (name, value)]
-    base = [str(artifact) if word == "ARTIFACT" else word for word in [*call.arguments, *filter(None, others)]]
+    base = [artifacts.get(word, word) for word in [*call.arguments, *filter(None, others)]]
     for hole in option.holes:
         for value in values if option.is_number else TEXTS:
             text = hole.format(value)

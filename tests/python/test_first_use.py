@@ -17,9 +17,15 @@ from quasilpv.synthesis import CONTROLLERS
 
 WRONG_USES = {
     "trakc serial-square": f"command line: verb: got trakc, expected one of {', '.join(VERBS)}; did you mean track?",
-    "list --colour": "command line: option: got --colour, expected one of --json, --help, -h (design list --help)",
-    "synth": "command line: ROBOT: got nothing, expected robot id, see design list, or a robot.toml: "
+    "list --colour": "command line: option: got --colour, expected one of --items, --json, --help, -h "
+    "(design list --help)",
+    "synth": "command line: ROBOT|SYSTEM: got nothing, expected a robot of design list, or a robot.toml: "
     "design robot show (design synth --help)",
+    "solve ex-I.1": "command line: --condition: got nothing, expected a condition of design list (design solve --help)",
+    "new": "command line: system|robot: got nothing, expected what to start (design new --help)",
+    "new robot": "command line: DESCRIPTION: got nothing, expected the URDF or MJCF of the robot",
+    "new system -o mine.txt": "command line: --out: got mine.txt, expected a name that ends in .py",
+    "new system arm.urdf": "command line: DESCRIPTION: got arm.urdf, expected nothing: it is for a robot",
     "synth arm3 --rate-hz fast": "command line: --rate-hz: got fast, expected a number (design synth --help)",
     "synth arm9": "robots: robot: got arm9, expected one of arm2, arm3, arm2-upright, arm3-light, fivebar, "
     "spring-disc, ur5; did you mean arm3?",
@@ -34,7 +40,7 @@ WRONG_USES = {
     "region ex-I.1 --condition II.6 --x a=-8:8 --y b=0:1:3": "command line: --x: got a=-8:8, expected "
     "NAME=FROM:TO:POINTS",
     "reproduce fig-II.9": "reproduction: item: got fig-II.9, expected fig-II.7, fig-II.6, fig-II.5, or another of "
-    "design list",
+    "design list --items",
 }
 
 
@@ -136,3 +142,28 @@ def test_when_the_shell_asks_for_its_script_expect_one_that_calls_the_command() 
     command = f"{shlex.quote(sys.executable)} -m quasilpv --show-completion bash; true"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True)
     assert "_DESIGN_COMPLETE=complete_bash" in done.stdout
+
+
+def test_when_a_file_to_start_from_is_written_expect_it_to_end_in_a_proved_controller(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["new", "system"]) == 0
+    capsys.readouterr()
+    commands = [
+        line.split()[1:] for line in Path("my_system.py").read_text().splitlines() if line.startswith("    design ")
+    ]
+    assert [command[0] for command in commands] == ["synth", "simulate"]
+    for command in commands:
+        assert run([*command, "--json"]) == 0
+    assert run(["new", "system"]) == 2  # it is there, and stays as it is
+    assert "my_system.py: file: got one that is there" in capsys.readouterr().err
+
+
+def test_when_items_are_listed_expect_them_only_if_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["list"]) == 0
+    short = capsys.readouterr().out
+    assert "fig-II.7" not in short
+    assert "design list --items" in short
+    assert run(["list", "--items"]) == 0
+    assert "fig-II.7" in capsys.readouterr().out

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-MOST_NAMES = 20
+MOST_NAMES = 24
 
 
 class QuasilpvError(Exception):

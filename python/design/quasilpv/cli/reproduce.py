@@ -16,7 +16,7 @@ REASON_WIDTH = 100
 
 
 def reproduce_command(
-    ids: Annotated[list[str] | None, typer.Argument(metavar="ID...", help="Items of design list.")] = None,
+    ids: Annotated[list[str] | None, typer.Argument(metavar="ID...", help="Items of design list --items.")] = None,
     *,
     everything: Annotated[bool, typer.Option("--all", help="Every item.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Coarser grids; the same rules.")] = False,
@@ -40,7 +40,7 @@ def reproduce_command(
 
     if everything == bool(ids):
         got = "both items and --all" if ids else "nothing"
-        raise InputError("command line", "reproduce", got, "--all, or items of design list")
+        raise InputError("command line", "reproduce", got, "--all, or items of design list --items")
     formats = formats_of(figure_formats)
     wanted = list(ITEMS.values()) if everything else [item(name) for name in dict.fromkeys(ids or ())]
     claim_folder(out)

@@ -119,4 +119,4 @@ def _choices(message: str, context: Mapping[str, Any]) -> str:
 def _first_sentence(text: str | None) -> str:
     """The first sentence of a help text, to go on with after a comma."""
     sentence = (text or "").partition(".  [")[0].partition(". ")[0].rstrip(".")
-    return sentence if sentence[:2].isupper() else sentence[:1].lower() + sentence[1:]
+    return sentence if sentence[:2].isalpha() and sentence[:2].isupper() else sentence[:1].lower() + sentence[1:]

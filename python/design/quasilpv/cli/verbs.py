@@ -61,13 +61,14 @@ class Verb:
 
 VERBS: Mapping[str, Verb] = {
     "demo": Verb("demo", "The main job: design, track, table and figures."),
+    "new": Verb("new", "A commented file to start a system or a robot of your own from."),
     "robot": Verb("robot", "A robot of your own, from its URDF or MJCF."),
-    "list": Verb("listing", "What there is: robots, controllers, scenarios, conditions."),
+    "list": Verb("listing", "What there is: robots, scenarios, systems, conditions."),
     "synth": Verb("synth", "Design a controller, of a robot or a system; write its artifact."),
     "inspect": Verb("inspect", "What is in an artifact."),
     "verify": Verb("verify", "Every inequality again, and what its verdict rests on."),
     "robust": Verb("robust", "The robust gate: every posture, payload, small delay."),
-    "export": Verb("export", "Gains and model of an artifact for other tools: .mat, .npz, .json."),
+    "export": Verb("export", "Gains of an artifact for other tools: .mat, .npz, .json."),
     "export-sdp": Verb("export_sdp", "The semidefinite program behind a law, as a file."),
     "track": Verb("track", "Scenarios in closed loop: table and figures."),
     "animate": Verb("animate", "Robots in motion, with and without compensation."),
@@ -110,7 +111,7 @@ class VerbGroup(TyperGroup):
             InputError: there is none of this name.
         """
         if args[0] not in VERBS and not args[0].startswith("-"):
-            raise InputError("command line", "verb", args[0], one_of(VERBS, args[0]))
+            raise InputError("command line", "verb", args[0], one_of(VERBS, args[0], "design --help"))
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[CompletionItem]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from quasilpv.errors import look_up
+from quasilpv.errors import InputError, one_of
 from quasilpv.reproduction import (
     chapter_one,
     chapter_three,
@@ -53,4 +53,6 @@ def item(name: str) -> Item:
     Raises:
         InputError: there is none; the message lists those there are.
     """
-    return look_up(ITEMS, name, "reproduction", "item")
+    if name not in ITEMS:
+        raise InputError("reproduction", "item", name, one_of(ITEMS, name, "design list --items"))
+    return ITEMS[name]
