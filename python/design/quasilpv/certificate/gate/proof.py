@@ -37,6 +37,7 @@ from quasilpv.certificate.gate.motion import MotionDocument, is_proved_in_motion
 from quasilpv.certificate.gate.tree_motion import Limits, TreeMotion, tree_motion
 from quasilpv.certificate.reading import Shipped, WitnessDocument
 from quasilpv.certificate.robot.data import inertia_data
+from quasilpv.certificate.robot.planar_chain import PlanarWitness, planar_range
 from quasilpv.certificate.robot.range import InertiaPair, NeededRange, Place, needed_range
 from quasilpv.certificate.robot.tree import TreeData
 from quasilpv.certificate.robot.tree_range import TreePair, TreeWitness, tree_range
@@ -217,7 +218,7 @@ def robust_gate(
         raise InputError(shipped.source, "law.motion_limits", "limits", expected)
     began = time.perf_counter()
     inertia = InertiaPair(inertia_data(shipped))
-    needed = needed_range(inertia)
+    needed = _planar_range(shipped, inertia)
     seconds = time.perf_counter() - began
     if needed is None:
         return RobustGate(loop, delay_samples, margin, None, None, None, seconds_to_check=seconds, lag=lag)
@@ -239,6 +240,17 @@ def robust_gate(
         seconds_to_check=seconds,
         lag=lag,
     )
+
+
+def _planar_range(shipped: Shipped[Any], inertia: InertiaPair) -> NeededRange | None:
+    """By the chain of the witness, if it has one; else by branch and bound over postures."""
+    witness = shipped.witness(PlanarWitness).chain if shipped.artifact.witness is not None else None
+    if witness is None:
+        return needed_range(inertia)
+    try:
+        return planar_range(inertia, witness)
+    except ValueError as error:
+        raise InputError(shipped.source, "witness.chain", error, "a storage for every joint but the last") from error
 
 
 def _lag(shipped: Shipped[Any], loop: AccelerationLoopData) -> Interval:

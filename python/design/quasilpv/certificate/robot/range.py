@@ -178,6 +178,11 @@ def needed_range(inertia: InertiaPair, tolerance: float = TOLERANCE) -> NeededRa
     return NeededRange(lowest[0], highest[0], lowest[1], highest[1], lowest[2] + highest[2])
 
 
+def extreme_place(inertia: InertiaPair, side: Side) -> Place:
+    """The place with the smallest or the largest ratio that samples and climbing find."""
+    return _Side(inertia, side).place
+
+
 class _Side:
     """One bound: the most extreme ratio found so far, and the proof that little lies beyond it."""
 
@@ -189,13 +194,18 @@ class _Side:
         points = inertia.samples()
         self._climb(points[self._extremes(points).argmax()])
 
+    @property
+    def place(self) -> Place:
+        """The most extreme ratio found so far."""
+        return self._inertia.place(self._point, self._sign * self._value)
+
     def prove(self, tolerance: float) -> tuple[fmpq, Place, int] | None:
         """Bound, place and cells; the tolerance is doubled when a proof takes too many cells."""
         while tolerance < LOOSEST_TOLERANCE:
             bound = self._bound(tolerance)
             outcome = self._prove(bound)
             if isinstance(outcome, int):
-                return bound, self._inertia.place(self._point, self._sign * self._value), outcome
+                return bound, self.place, outcome
             if outcome is None:
                 tolerance *= 2
             else:  # a more extreme ratio than the samples showed

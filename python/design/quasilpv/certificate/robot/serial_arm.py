@@ -40,7 +40,7 @@ class SerialArmData:
 
     def inertia(self, mass_scale: Sequence[float], com_scale: Sequence[float]) -> Polynomials:
         """D of the module's formula."""
-        links, outer = self._loaded(mass_scale, com_scale)
+        links, outer = self.loaded(mass_scale, com_scale)
         moments = self.first_moments(mass_scale, com_scale)
         n = self.joints
         D = [[fmpq_poly([0])] * n for _ in range(n)]
@@ -52,13 +52,13 @@ class SerialArmData:
 
     def first_moments(self, mass_scale: Sequence[float], com_scale: Sequence[float]) -> list[fmpq_poly]:
         """h of the module's formula."""
-        links, outer = self._loaded(mass_scale, com_scale)
+        links, outer = self.loaded(mass_scale, com_scale)
         return [link.first_moment + link.length * mass for link, mass in zip(links, outer, strict=True)]
 
-    def _loaded(
+    def loaded(
         self, mass_scale: Sequence[float], com_scale: Sequence[float]
     ) -> tuple[list[LoadedLink], list[fmpq_poly]]:
-        """Links with their payload, and the mass beyond each of them."""
+        """Links with their payload, and the mass beyond each of them; in the order of the links."""
         links = [LoadedLink.of(*factors) for factors in zip(self.document.links, mass_scale, com_scale, strict=True)]
         return links, [sum((link.mass for link in links[k + 1 :]), fmpq_poly([0])) for k in range(self.joints)]
 

@@ -14,6 +14,7 @@ from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.design import AccelerationDesign, design_acceleration_law
 from quasilpv.synthesis.acceleration.envelope import acceleration_envelope
 from quasilpv.synthesis.acceleration.moving_lyapunov import MovingLyapunov, moving_lyapunov
+from quasilpv.synthesis.acceleration.planar_range import planar_chain_witness
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign, inertia_table, premise_and_gravity
 from quasilpv.systems.robots.registry import Robot
@@ -74,7 +75,7 @@ def acceleration_law_of(robot: Robot, specification: Specification, design: Acce
         expressions=premise_and_gravity(robot),
         inputs={"controller": controller, "specification": specification.to_document()},
         report=design.report(),
-        witness=_witness(design, specification, lyapunov),
+        witness=_witness(robot, design, specification, lyapunov),
     )
 
 
@@ -86,7 +87,7 @@ def _lyapunov(design: AccelerationDesign, specification: Specification) -> Movin
 
 
 def _witness(
-    design: AccelerationDesign, specification: Specification, lyapunov: MovingLyapunov | None
+    robot: Robot, design: AccelerationDesign, specification: Specification, lyapunov: MovingLyapunov | None
 ) -> dict[str, Any]:
     """The points of the two conditions, in their own time unit, and the bandwidths that fix their data."""
     wc, wo = design.candidate.bandwidths
@@ -96,6 +97,7 @@ def _witness(
         longest = {"longest_delay_samples": specification.delay_samples}
         motion = {"motion": {**design.disc.to_document(), **longest, **function}}
     return {
+        **planar_chain_witness(robot, design.candidate.inertia_scale),
         "feedback": {"condition": "sampled-feedback", "bandwidth_rad_s": wc, **design.feedback.point("P")},
         "observer": {"condition": "sampled-observer", "bandwidth_rad_s": wo, **design.observer.point("Q")},
         **motion,
