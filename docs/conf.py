@@ -21,7 +21,7 @@ project_copyright = author
 version = release = quasilpv.__version__
 
 extensions = [
-    "myst_parser",
+    "myst_nb",  # pages and notebooks; a test executes these, the site shows what they printed
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "command_help",
@@ -31,6 +31,7 @@ exclude_patterns = ["_*"]
 default_role = "code"
 
 myst_heading_anchors = 3
+nb_execution_mode = "off"
 
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True

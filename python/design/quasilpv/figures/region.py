@@ -23,6 +23,11 @@ PROVED_LOOK = {"facecolor": SKY, "edgecolor": BLUE, "alpha": 0.6}
 UNDECIDED_LOOK = {"facecolor": "none", "edgecolor": ORANGE, "hatch": "/////"}
 
 
+def plot_region(*maps: Region, title: str | None = None) -> Figure:
+    """One map of `quasilpv.region`, or several over the same axes, as a figure; see `region_figure`."""
+    return region_figure(maps, title)
+
+
 def region_figure(
     regions: Sequence[Region],
     title: str | None = None,
