@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,8 +20,8 @@ def envelope_figure(result: TrackResult) -> Figure:
 
     Left: the angle, the tube ``r +- margin`` in which the errors of the box set stay, and the border of the domain.
     Middle: the errors of angle and speed against the torque set. Right: the same, closer, against the peak set of the
-    smallest peak that accounts for the run's angle error, printed beside the largest peak the margin allows; a dot is a
-    sample, for a line between samples would be a scribble.
+    smallest peak that accounts for the run's angle error, whose share of the largest peak the margin allows is printed;
+    a dot is a sample, for a line between samples would be a scribble.
 
     Args:
         result: the run.
@@ -85,10 +83,11 @@ def _plot_peak_set(axes: Axes, result: TrackResult, envelope: OperatingEnvelope,
     peak = float(np.abs(angle).max()) / float(envelope.peak.angle_bound_rad[joint])
     border = envelope.peak.border(joint, peak)
     axes.fill(1e6 * border[:, 0], border[:, 1], facecolor=VERMILION, alpha=0.12)
-    axes.plot(1e6 * border[:, 0], border[:, 1], color=VERMILION, label="peak set that spans the run's angle error")
+    label = "peak set as wide as the run's angle error: a size, no bound"
+    axes.plot(1e6 * border[:, 0], border[:, 1], color=VERMILION, label=label)
     axes.plot(1e6 * angle, speed, color=BLUE, linestyle="", marker=".", markersize=1.6, alpha=0.5, markeredgewidth=0)
     allowed = envelope.peak.largest_scale(envelope.reference_margin_rad)[joint]
-    axes.set_title(f"peak {_number(peak)} {envelope.peak_unit},\nmargin allows {_number(allowed)}", fontsize=8.0)
+    axes.set_title(f"{peak / allowed:.2%} of what\nthe margin allows", fontsize=8.0)
 
 
 def _errors(result: TrackResult, joint: int) -> tuple[FloatArray, FloatArray]:
@@ -97,11 +96,3 @@ def _errors(result: TrackResult, joint: int) -> tuple[FloatArray, FloatArray]:
         run.true_angle_rad[:, joint] - run.reference_angle_rad[:, joint],
         run.true_speed_rad_s[:, joint] - run.reference_speed_rad_s[:, joint],
     )
-
-
-def _number(value: float) -> str:
-    """Two digits, with a power of ten where that is shorter."""
-    if 0.1 <= value < 1e4:
-        return f"{value:.2g}" if value < 100 else f"{value:.0f}"
-    exponent = math.floor(math.log10(value)) if value > 0.0 else 0
-    return f"{value / 10.0**exponent:.1f}·10{str(exponent).translate(SUPERSCRIPTS)}"

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from scipy.ndimage import uniform_filter1d
 
 from quasilpv.arrays import FloatArray
 from quasilpv.experiments.result import Disturbance, TrackResult
@@ -29,6 +30,9 @@ AXES = "XYZ"
 
 NARROWEST = 0.75
 """Of the sides of a path's plot, the shorter one in parts of the longer one."""
+
+MEAN_S = 0.05
+"""Of a trace that is mostly noise."""
 
 TALL = 3
 """So many panels stand one above the other; more stand in two columns."""
@@ -72,8 +76,9 @@ def path_figure(result: TrackResult) -> Figure:
     """The tool's path in the plane over its reference, and the same path with the error exaggerated.
 
     The right panel draws reference + factor * (actual - reference): the factor, a round number printed in the legend,
-    makes the largest deviation about a tenth of the path's extent, so that micrometres are seen where they happen. A
-    path in space is seen along the axis of the base in which it extends least.
+    makes the largest deviation about a tenth of the path's extent, so that micrometres are seen where they happen;
+    where the error is as large as that by itself there is no such panel. A path in space is seen along the axis of the
+    base in which it extends least.
     """
     plane = plane_of(result.reference_position_m)
     reference, actual = result.reference_position_m[:, plane], result.tool_position_m[:, plane]
@@ -81,19 +86,20 @@ def path_figure(result: TrackResult) -> Figure:
     factor = exaggeration(error, reference)
     with style():
         figure = new_figure(4.0, f"{result.title}: path of the tool")
-        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-        for axes in (left, right):
+        panels = figure.subplots(1, 1 if factor == 1.0 else 2, sharex=True, sharey=True, squeeze=False)[0]
+        for axes in panels:
             axes.plot(*reference.T, color=REFERENCE_COLOUR, linewidth=2.2, label="reference")
             axes.plot(*reference[0], marker="o", color=REFERENCE_COLOUR, markersize=4)
             axes.set_aspect("equal", adjustable="box")
             axes.set_xlabel(f"{AXES[plane[0]]} (m)")
             axes.xaxis.set_major_locator(MaxNLocator(4))
-        left.plot(*actual.T, color=BLUE, linewidth=1.0, label="tool")
-        right.plot(*(reference + factor * error).T, color=VERMILION, label=f"tool, error × {factor:g}")
-        left.set_ylabel(f"{AXES[plane[1]]} (m)")
-        for axes in (left, right):
+        panels[0].plot(*actual.T, color=BLUE, linewidth=1.0, label="tool")
+        if factor != 1.0:
+            panels[1].plot(*(reference + factor * error).T, color=VERMILION, label=f"tool, error × {factor:g}")
+        panels[0].set_ylabel(f"{AXES[plane[1]]} (m)")
+        for axes in panels:
             legend_above(axes)
-        _widen(left)
+        _widen(panels[0])
         return figure
 
 
@@ -178,12 +184,18 @@ def disturbance_figure(result: TrackResult) -> Figure:
 
 
 def velocity_figure(result: TrackResult) -> Figure:
-    """Error of the estimated (or filtered) joint speeds over time."""
+    """Error of the joint speeds that the law used, estimated or measured and filtered, over time.
+
+    The trace is light, for most of it is noise; over it its mean of the last `MEAN_S`.
+    """
     error = result.run.estimated_speed_rad_s - result.run.true_speed_rad_s
     with style():
-        figure = new_figure(1.4 * result.run.joints + 0.6, f"{result.title}: error of the estimated joint speed")
+        figure = new_figure(1.4 * result.run.joints + 0.6, f"{result.title}: error of the joint speed the law used")
+        samples = max(1, round(MEAN_S * result.rate_hz))
         for joint, axes in enumerate(figure.subplots(result.run.joints, 1, sharex=True, squeeze=False)[:, 0]):
-            axes.plot(result.run.time_s, error[:, joint], color=JOINT_COLOURS[joint], linewidth=0.7)
+            colour, own = JOINT_COLOURS[joint], error[:, joint]
+            axes.plot(result.run.time_s, own, color=colour, linewidth=0.5, alpha=0.35)
+            axes.plot(result.run.time_s, uniform_filter1d(own, samples), color=colour, linewidth=1.4)
             axes.set_ylabel(f"joint {joint + 1} (rad/s)")
             axes.set_title(f"rms {np.sqrt(np.mean(error[:, joint] ** 2)):.2g} rad/s")
         figure.align_ylabels()
@@ -199,8 +211,8 @@ def plot_disturbance(axes: Axes, result: TrackResult, joint: int) -> str:
     """
     disturbance = _true_disturbance(result)
     true, estimate = disturbance.values[:, joint], result.run.filtered_disturbance[:, joint]
-    axes.plot(result.run.time_s, estimate, color=ORANGE, linewidth=1.8, label="estimate")
-    axes.plot(result.run.time_s, true, color=BLACK, linewidth=0.7, label="true")
+    axes.plot(result.run.time_s, true, color=REFERENCE_COLOUR, linewidth=2.2, label="true")
+    axes.plot(result.run.time_s, estimate, color=ORANGE, linewidth=0.7, label="estimate")
     axes.set_ylabel(f"joint {joint + 1} ({disturbance.unit})")
     return f"{np.sqrt(np.mean((estimate - true) ** 2)):.3g} {disturbance.unit}"
 
