@@ -9,7 +9,8 @@ namespace quasilpv {
   PLANT(serial_arm)            \
   PLANT(five_bar)              \
   PLANT(spring_disc)           \
-  PLANT(tree)
+  PLANT(tree)                  \
+  PLANT(elastic_tree)
 
 namespace plants {
 #define DECLARE(plant) PlantKind plant();

@@ -271,7 +271,7 @@ class PlantRun {
     report_.watchdog_at_end = true;
     SampleTorque brake{{}, kNoCommand};
     for (std::size_t j = 0; j < static_cast<std::size_t>(session_.joints()); ++j) {
-      brake.torque[j] = -settings_.brake_nm_s[j] * session_.truth().speed[j];
+      brake.torque[j] = -settings_.brake_nm_s[j] * session_.truth().driven_speed()[j];
     }
     return brake;
   }
@@ -335,13 +335,13 @@ const char* to_string(PlantRunEnd end) noexcept {
 JointArray viscous_brake(const Scenario& scenario, double time_constant_s) {
   const std::unique_ptr<Plant> plant = scenario.make_plant();
   const Eigen::VectorXd state = plant->initial_state(scenario.initial_angle, scenario.initial_speed);
-  const JointArray without_torque = plant->sample(0.0, state).acceleration;
+  const JointArray without_torque = plant->sample(0.0, state).driven_acceleration();
   JointArray brake{};
   for (std::size_t j = 0; j < static_cast<std::size_t>(plant->joints()); ++j) {
     JointArray unit{};
     unit[j] = 1.0;
     plant->set_torque(unit);
-    const double mobility = plant->sample(0.0, state).acceleration[j] - without_torque[j];
+    const double mobility = plant->sample(0.0, state).driven_acceleration()[j] - without_torque[j];
     brake[j] = 1.0 / (time_constant_s * mobility);
   }
   return brake;

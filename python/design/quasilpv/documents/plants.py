@@ -71,5 +71,40 @@ class TreePlant(MechanismDocument, _Labelled):
         return len(self.chain)
 
 
-Plant: TypeAlias = Annotated[SerialArmPlant | FiveBarPlant | SpringDiscPlant | TreePlant, Field(discriminator="kind")]
+class ElasticJoint(RubbingJoint):
+    """A joint whose gear gives: spring and damper between motor and link; friction is the motor's.
+
+    Attributes:
+        stiffness_nm_rad, damping_nm_s: of the gear.
+        rotor_inertia_kg_m2: of the motor, reflected to the joint.
+    """
+
+    rotor_inertia_kg_m2: Positive
+    stiffness_nm_rad: Positive
+    damping_nm_s: NonNegative
+
+
+class ElasticTreePlant(MechanismDocument, _Labelled):
+    """A robot in space with elastic joints: motors and links move on their own.
+
+    Attributes:
+        encoder_side: what the encoders sit on.
+    """
+
+    PAYLOADS = TreePayloads
+
+    kind: Literal["elastic-tree"] = "elastic-tree"
+    gravity_m_s2: Row
+    encoder_side: Literal["motor", "link"]
+    chain: Annotated[tuple[ElasticJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
+
+    @property
+    def joints(self) -> int:
+        """Actuated and measured joints."""
+        return len(self.chain)
+
+
+Plant: TypeAlias = Annotated[
+    SerialArmPlant | FiveBarPlant | SpringDiscPlant | TreePlant | ElasticTreePlant, Field(discriminator="kind")
+]
 """Any robot a scenario can move."""

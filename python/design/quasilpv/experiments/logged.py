@@ -7,7 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from quasilpv.documents.mechanism import LinkParameters
-from quasilpv.documents.plants import FiveBarPlant, Plant, SerialArmPlant, SpringDiscPlant, TreePlant
+from quasilpv.documents.plants import (
+    ElasticTreePlant,
+    FiveBarPlant,
+    Plant,
+    SerialArmPlant,
+    SpringDiscPlant,
+    TreePlant,
+)
 from quasilpv.errors import InputError
 from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.run import Run
@@ -79,12 +86,12 @@ def mechanism_of(plant: Plant) -> PlanarMechanism | TreeMechanism:
         return RhombicFiveBar(FiveBarLinkage(name, _link(plant.active), _link(plant.passive), plant.gravity_m_s2))
     if isinstance(plant, SpringDiscPlant):
         return RollingDisc(name, **plant.model_dump(exclude={"kind", "label"}))
-    if isinstance(plant, TreePlant):
+    if isinstance(plant, TreePlant | ElasticTreePlant):
         return _tree(plant)
     raise InputError("scenario", "plant.kind", name, "a mechanism that is known here")
 
 
-def _tree(plant: TreePlant) -> TreeMechanism:
+def _tree(plant: TreePlant | ElasticTreePlant) -> TreeMechanism:
     joints = tuple(
         TreeJoint(
             name=joint.name,

@@ -1,0 +1,68 @@
+// A robot in space whose gears give, as a plant.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "quasilpv/kinematic_tree.hpp"
+#include "quasilpv/plant.hpp"
+#include "quasilpv/tree_plant.hpp"
+
+namespace quasilpv {
+
+/// The gear of one joint: spring and damper between motor and link.
+struct ElasticGear {
+  double stiffness_nm_rad = 0.0;     ///< K > 0
+  double damping_nm_s = 0.0;         ///< D >= 0
+  double rotor_inertia_kg_m2 = 0.0;  ///< B > 0, reflected to the joint
+};
+
+/// Physical parameters, the payload merged into the last body; 1 to 7 joints.
+struct ElasticTreeParameters {
+  std::string label;
+  KinematicTree tree;                   ///< links only: its rotor inertias are 0
+  std::vector<ElasticGear> gears;       ///< one per joint
+  std::vector<JointFriction> friction;  ///< of the motors, one per joint
+  bool encoders_on_motors = true;       ///< false: on the links
+};
+
+/// The robot as a plant, y = (q, th, w, v): joint angles, motor angles reflected to the joints, and their rates.
+///
+///     q' - w = 0,   th' - v = 0
+///     M(q) w' + h(q, w) - K (th - q) - D (v - w) - external torque = 0
+///     B v' + f v + c tanh(v / w0) + K (th - q) + D (v - w) - torque = 0
+///
+/// M and h of the links alone, as in TreeDynamics; rotors turn about their joints only. It begins with the springs
+/// carrying the weight. Source: Spong 1987, Modeling and control of elastic joint robots.
+class ElasticTreePlant final : public Plant {
+ public:
+  /// INIT-ONLY.
+  explicit ElasticTreePlant(ElasticTreeParameters parameters);
+
+  const ElasticTreeParameters& parameters() const noexcept { return parameters_; }
+
+  int joints() const noexcept override { return dynamics_.joints(); }
+  int size() const noexcept override { return 4 * dynamics_.joints(); }
+  Eigen::VectorXd initial_state(const JointArray& angle, const JointArray& speed) const override;
+  void residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept override;
+  void jacobian(double t, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept override;
+  void derivative(double t, ConstVector y, Vector y_dot) const override;
+  PlantSample sample(double t, ConstVector y) const override;
+
+  /// Kinetic, gravity's and the springs' energy, J; see TreeDynamics::energy().
+  double energy(ConstVector y) const;
+
+ private:
+  /// K (th - q) + D (v - w), N m.
+  TreeVector spring_torque(ConstVector y) const noexcept;
+  TreeVector friction(ConstVector motor_speed) const noexcept;
+
+  ElasticTreeParameters parameters_;
+  TreeDynamics dynamics_;
+  TreeVector stiffness_;
+  TreeVector damping_;
+  TreeVector rotor_;
+};
+
+}  // namespace quasilpv

@@ -1,0 +1,149 @@
+"""A robot with elastic joints as a plant: against a prototype in numpy, two closed forms, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
+from quasilpv.documents.canonical import canonical_json
+from quasilpv.errors import InputError
+from quasilpv.scenarios import Scenario
+from reference.elastic_tree import ElasticArm
+from reference.random_trees import random_tree
+
+T = 1e-3
+SINE = {"joint": 0, "amplitude_nm": 6.0, "frequency_rad_s": 9.0, "phase_rad": 0.4}
+IDA = {"kind": "ida", "relative_tolerance": 1e-10, "absolute_tolerance": 1e-12}
+RK4 = {"kind": "rk4", "steps_per_sample": 40}
+
+
+def random_arm(n: int, seed: int) -> ElasticArm:
+    rng = np.random.default_rng(seed)
+    drawn = random_tree(rng, n, sliding=0.0)
+    rotors = rng.uniform(0.1, 0.5, n)
+    joints = zip(drawn.joints, rotors, strict=True)
+    tree = replace(drawn, joints=tuple(replace(j, rotor_inertia_kg_m2=float(rotor)) for j, rotor in joints))
+    return ElasticArm(
+        tree, rng.uniform(3e3, 2e4, n), rng.uniform(0.5, 4.0, n), rng.uniform(0.0, 2.0, n), rng.uniform(0.0, 3.0, n)
+    )
+
+
+def document(arm: ElasticArm, integrator: dict[str, Any], *, side: str = "motor", sine: bool = True) -> dict[str, Any]:
+    n = arm.tree.order
+    return {
+        "schema": "quasilpv.scenario",
+        "schema_version": 1,
+        "name": "elastic",
+        "duration_s": 0.3,
+        "plant": arm.plant_document(side),
+        "integrator": integrator,
+        "external_torque": [SINE] if sine else [],
+        "sensors": {"encoder_bits": 0, "velocity_noise_rad_s": 0.0, "seed": 1},
+        "transport_delay_s": 0.0,
+        "initial": {"angle_rad": [0.2] * n, "speed_rad_s": [0.0] * n},
+    }
+
+
+def parsed(content: dict[str, Any]) -> _runtime.Scenario:
+    return _runtime.Scenario.parse(canonical_json(content))
+
+
+def external(n: int, t: float) -> FloatArray:
+    torque = np.zeros(n)
+    torque[0] = 6.0 * np.sin(9.0 * t + 0.4)
+    return torque
+
+
+@pytest.mark.parametrize("n", [1, 3, 6, 7])
+def test_when_states_are_random_expect_the_equations(n: int) -> None:
+    arm, rng = random_arm(n, n), np.random.default_rng(20 + n)
+    plant = _runtime.Plant(parsed(document(arm, IDA)))
+    for _ in range(20):
+        y = np.concatenate([rng.uniform(-2.0, 2.0, n), rng.uniform(-2.0, 2.0, n), rng.normal(size=2 * n)])
+        y_dot, torque, t = rng.normal(size=4 * n), rng.normal(0.0, 50.0, n), float(rng.uniform(0.0, 2.0))
+        expected = arm.residual(y, y_dot, torque, external(n, t))
+        scale = 1.0 + np.abs(arm.stiffness).max() * 4.0
+        np.testing.assert_allclose(plant.residual(t, y, y_dot, torque), expected, rtol=0, atol=1e-12 * scale)
+        solved = arm.derivative(y, torque, external(n, t))
+        size = 1.0 + np.abs(solved).max()
+        np.testing.assert_allclose(plant.derivative(t, y, torque), solved, rtol=0, atol=1e-10 * size)
+
+
+@pytest.mark.parametrize("integrator", [IDA, RK4], ids=["ida", "rk4"])
+@pytest.mark.parametrize("n", [1, 4])
+def test_when_torques_are_held_expect_the_motion_of_the_prototype(n: int, integrator: dict[str, Any]) -> None:
+    arm, rng = random_arm(n, 30 + n), np.random.default_rng(n)
+    torques = rng.normal(0.0, 20.0, (60, n))
+    session = _runtime.PlantSession(parsed(document(arm, integrator)), T)
+    start = np.concatenate([np.full(n, 0.2), 0.2 + arm.tree.gravity(np.full(n, 0.2)) / arm.stiffness, np.zeros(2 * n)])
+    expected = arm.run(start, torques, T, 20, lambda t: external(n, t))
+    for k, torque in enumerate(torques):
+        motors, speeds = session.measure()
+        np.testing.assert_allclose(motors, expected[k, n : 2 * n], rtol=0, atol=2e-8)
+        np.testing.assert_allclose(speeds, expected[k, 3 * n :], rtol=0, atol=2e-6)
+        np.testing.assert_allclose(session.angle, expected[k, :n], rtol=0, atol=2e-8)
+        session.advance(torque)
+    assert np.abs(expected[-1, :n] - expected[0, :n]).max() > 1e-3
+
+
+def free_joint(damping: float) -> ElasticArm:
+    """One joint about a vertical axis: two discs and a spring."""
+    arm = random_arm(1, 5)
+    tree = replace(arm.tree, gravity_m_s2=np.zeros(3))
+    none = np.zeros(1)
+    return ElasticArm(tree, np.array([5e3]), np.array([damping]), none, none)
+
+
+def test_when_a_step_of_torque_hits_two_discs_and_a_spring_expect_the_frequency_of_the_closed_form() -> None:
+    """``B th'' = 1 - K (th - q)``: the deflection is ``(1 - cos(w t)) J / ((J + B) K)``, ``w^2 = K (1/J + 1/B)``."""
+    arm = free_joint(0.0)
+    J, B, K = arm.links_inertia(np.zeros(1))[0, 0], arm.rotors[0], arm.stiffness[0]
+    sessions = [
+        _runtime.PlantSession(parsed(document(arm, IDA, side=side, sine=False)), T) for side in ("motor", "link")
+    ]
+    w = np.sqrt(K * (1.0 / J + 1.0 / B))
+    for k in range(100):
+        motor, link = (session.measure()[0][0] for session in sessions)
+        deflection = (1.0 - np.cos(w * k * T)) * J / ((J + B) * K)
+        assert motor - link == pytest.approx(deflection, abs=1e-9)
+        for session in sessions:
+            session.advance(np.array([1.0]))
+
+
+def test_when_the_arm_starts_at_rest_expect_its_springs_to_carry_its_weight() -> None:
+    arm = random_arm(4, 8)
+    arm = ElasticArm(arm.tree, arm.stiffness, arm.damping, np.zeros(4), np.zeros(4))
+    session = _runtime.PlantSession(parsed(document(arm, IDA, sine=False)), T)
+    q = np.full(4, 0.2)
+    weight = arm.tree.gravity(q)
+    np.testing.assert_allclose(session.measure()[0], q + weight / arm.stiffness, rtol=0, atol=1e-12)
+    for _ in range(50):
+        session.advance(weight)
+    np.testing.assert_allclose(session.angle, q, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("stiffness_nm_rad", 0.0), ("stiffness_nm_rad", None), ("damping_nm_s", -1.0), ("rotor_inertia_kg_m2", 0.0)],
+)
+def test_when_a_gear_is_none_expect_it_refused_by_name_on_both_sides(field: str, value: float | None) -> None:
+    content = document(random_arm(2, 3), IDA)
+    if value is None:
+        del content["plant"]["joints"][1][field]
+    else:
+        content["plant"]["joints"][1][field] = value
+    for read in (parsed, lambda tree: Scenario.from_document(tree, "scenario")):
+        with pytest.raises(InputError, match=rf"joints\[1\]\.{field}"):
+            read(content)
+
+
+def test_when_encoders_sit_nowhere_expect_it_refused_by_name() -> None:
+    content = document(random_arm(2, 3), IDA, side="both")
+    for read in (parsed, lambda tree: Scenario.from_document(tree, "scenario")):
+        with pytest.raises(InputError, match=r"encoder_side"):
+            read(content)
