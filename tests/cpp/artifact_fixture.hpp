@@ -293,6 +293,12 @@ inline Json law_table(const std::string& kind, const TestArm& arm) {
                 {"kd", repeated(300.0)},
                 {"ki", repeated(9000.0)},
                 {"velocity_filter_time_constant_s", 2e-3}});
+  } else if (kind == "motor-pid") {  // with a chain only, see with_chain()
+    law.update({{"feedback", {{"kp", -31500.0}, {"kd", -700.0}, {"ki", -126000.0}}},
+                {"observer", {0.8, 250.0, 40000.0, 2.5e6}},
+                {"rotor_inertia_kg_m2", repeated(0.5)},
+                {"stiffness_nm_rad", repeated(2e4)},
+                {"correction_bandwidth_rad_s", 3.0}});
   } else {
     law.update({{"gp", repeated(1200.0)},
                 {"gd", repeated(60.0)},
@@ -340,7 +346,7 @@ inline Json artifact_table(const std::string& kind, int joints) {
 }
 
 /// The kinds of laws whose design inertia may be a chain of bodies.
-inline constexpr const char* kChainLaws[] = {"dob-acceleration", "pid", "ctc", "ctc-dob"};
+inline constexpr const char* kChainLaws[] = {"dob-acceleration", "pid", "ctc", "ctc-dob", "motor-pid"};
 
 /// The same artifact for a robot in space: a chain of bodies about axes in turn, with a load for its gravity only.
 inline Json with_chain(Json document) {

@@ -10,7 +10,7 @@ from quasilpv import _runtime
 from quasilpv.certificate import LAWS
 from quasilpv.documents.design_inertia import DesignInertia
 from quasilpv.documents.strict_model import NonNegative, Number, Positive, StrictModel
-from quasilpv.documents.tables import Intervals, Matrix, PolytopeTable, Vector
+from quasilpv.documents.tables import Intervals, Matrix, PolytopeTable, PositiveVector, Vector
 
 ROOT = Path(__file__).parents[2]
 REGISTRY = Path("cpp/controller/src/laws/registry.cpp")
@@ -24,6 +24,7 @@ NAMES_OF_TYPES: list[tuple[Any, str]] = [
     (tuple[Number, Number, Number, Number], "numbers"),
     (Vector, "joint-values"),
     (Intervals, "intervals"),
+    (PositiveVector, "positive-joint-values"),
     (Matrix, "matrix"),
     (tuple[Matrix, ...], "matrices"),
     (PolytopeTable, "polytope"),

@@ -7,7 +7,7 @@ torque limits and the inertia of a payload are asked for by name.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, pi
 from pathlib import Path
@@ -19,6 +19,7 @@ from pydantic import Field, model_validator
 from quasilpv.descriptions.described_tree import DescribedJoint, DescribedTree
 from quasilpv.descriptions.mjcf import read_mjcf
 from quasilpv.descriptions.safe_xml import read_xml, root_of
+from quasilpv.descriptions.stated_drive import DriveKeys, drive_of
 from quasilpv.descriptions.urdf import read_urdf
 from quasilpv.documents.programs import MAX_JOINTS
 from quasilpv.documents.strict_model import FieldError, StrictModel, validate
@@ -50,7 +51,7 @@ class Base(StrictModel):
     orientation: Literal["floor", "wall", "ceiling"] | tuple[float, float, float] = "floor"
 
 
-class Joint(StrictModel):
+class Joint(DriveKeys):
     """What is stated of one joint; SI units, angles in rad (m for a joint that slides)."""
 
     angle: Interval | None = None
@@ -59,7 +60,6 @@ class Joint(StrictModel):
     slew: Positive | None = None
     rotor_inertia: NonNegative | None = None
     rotor_tolerance: Share = 0.0
-    rigid: bool | None = None
     encoder_bits: int | None = Field(default=None, ge=8, le=32)
     friction_viscous: NonNegative = 0.0
     friction_coulomb: NonNegative = 0.0
@@ -152,6 +152,7 @@ class RobotSource:
             expected = f"at most {MAX_JOINTS}: lock some by name, or choose another tip_link"
             raise InputError(source, "joints", f"{len(names)} joints", expected)
         joints = tuple(_joint(source, described, stated.joints.get(described.name, Joint())) for described in moving)
+        _require_one_kind(source, joints)
         chain = self.described.chain(tip, stated.locked, {joint.name: joint.angle_rad for joint in joints})
         driven = tuple(
             replace(own, rotor_inertia_kg_m2=joint.rotor_inertia_kg_m2)
@@ -221,12 +222,7 @@ def _joint(source: str, described: DescribedJoint, stated: Joint) -> SpatialJoin
         described.rotor_inertia_kg_m2,
         "the rotor's inertia times the gear ratio squared, kg m^2 (data sheet of the drive); 0 only for direct drive",
     )
-    if stated.rigid is None:
-        expected = "true for a direct or torque-controlled drive; false for a gear that gives, which no law here takes"
-        raise InputError(source, f"{place}.rigid", "nothing", expected)
-    if not stated.rigid:
-        expected = "true: the laws for elastic joints are not part of this version"
-        raise InputError(source, f"{place}.rigid", "false", expected)
+    drive = drive_of(source, place, stated, rotor)
     torque = required("torque", stated.torque, described.torque, "the largest torque of the drive, N m")
     speed = required("speed", stated.speed, described.speed, "the largest speed of the joint, rad/s")
     angle = _angles(source, place, described, stated)
@@ -244,7 +240,17 @@ def _joint(source: str, described: DescribedJoint, stated: Joint) -> SpatialJoin
         friction_coulomb_nm=stated.friction_coulomb,
         motion_angle_rad=stated.motion_angle,
         motion_speed_rad_s=stated.motion_speed,
+        drive=drive,
     )
+
+
+def _require_one_kind(source: str, joints: Sequence[SpatialJoint]) -> None:
+    """Refuse arms that are rigid in some joints only, or whose encoders sit on several sides."""
+    sides = [None if joint.drive is None else joint.drive.encoder_side for joint in joints]
+    for joint, side in zip(joints, sides, strict=True):
+        if side != sides[0]:
+            expected = "all joints rigid, or all elastic with their encoders on the same side"
+            raise InputError(source, f"joints.{joint.name}.stiffness", "joints of several kinds", expected)
 
 
 def _check_motion(source: str, place: str, stated: Joint, angle: Interval, speed: float) -> None:

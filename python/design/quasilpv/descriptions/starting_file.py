@@ -46,7 +46,9 @@ def _table(joint: DescribedJoint) -> Iterator[str]:
     yield from _line("torque", joint.torque, "100.0", "the largest of the drive")
     rotor = "the rotor's times the gear ratio squared; 0 only for direct drive"
     yield from _line("rotor_inertia", joint.rotor_inertia_kg_m2, "0.1", rotor)
-    yield "# ? rigid = true   # true for a direct or torque-controlled drive"
+    yield '# ? stiffness = [1e4, 4e4]   # of the gear, N m/rad, lowest and highest; "rigid" for a direct drive'
+    yield "# ? damping_least = 0.0      # of a gear that gives: damping over stiffness, s; 0 is safe"
+    yield '# ? encoder_side = "motor"   # of a gear that gives: or "link", "both"'
     for name, value in (("damping", joint.damping_nm_s), ("friction", joint.friction_nm)):
         if value:
             yield f"# the description has a {name} of {value:g}; if real: friction_viscous, friction_coulomb"

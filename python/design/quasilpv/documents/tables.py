@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from quasilpv.documents.strict_model import FieldError, Number, StrictModel
+from quasilpv.documents.strict_model import FieldError, Number, Positive, StrictModel
 
 MAX_PREMISES = 32
 ROUNDING = 1e-12
 
 Vector = tuple[Number, ...]
 Matrix = tuple[Vector, ...]
+PositiveVector = tuple[Positive, ...]
 Intervals = tuple[tuple[Number, Number], ...]
 
 

@@ -58,6 +58,6 @@ def without_compensation(design: TrackingDesign) -> TrackingDesign:
         raise InputError(design.controller, "disturbance_compensation", "off", "dob-acceleration, the law that has it")
     without = {"disturbance_compensation": False}
     # The envelope and the Lyapunov function are those of the compensated loop.
-    law = {name: member for name, member in design.law.items() if name != "lyapunov_bound"}
+    law = {name: member for name, member in design.law.items() if name not in ("lyapunov_bound", "motion_limits")}
     witness = {name: member for name, member in (design.witness or {}).items() if name not in ("envelope", "motion")}
     return replace(design, law={**law, **without}, inputs={**design.inputs, **without}, witness=witness or None)

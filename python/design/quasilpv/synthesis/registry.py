@@ -28,23 +28,38 @@ class ControllerKind:
         function: from robot, specification and progress to a design: ``module.name`` in this room.
         rate_hz: sample rate if nobody asks for another.
         in_space: the same function for robots in space; None if there is none.
+        arm_classes: of robots in space that it is for (`quasilpv.systems.robots.joint_drive.ArmClass`).
     """
 
     summary: str
-    function: str
+    function: str | None
     rate_hz: float = 1000.0
     in_space: str | None = None
+    arm_classes: tuple[str, ...] = ("rigid",)
 
     def design(self, robot: AnyRobot, specification: Specification, progress: Progress) -> TrackingDesign:
         """Design it; see `synthesise`."""
         function = self.in_space if robot.in_space else self.function
         if function is None:
-            known = ", ".join(name for name, kind in CONTROLLERS.items() if kind.in_space is not None)
-            raise InputError(robot.id, "controller", self.summary, f"one for robots in space: {known}")
+            side, place = ("in_space", "in space") if robot.in_space else ("function", "in the plane")
+            known = ", ".join(name for name, kind in CONTROLLERS.items() if getattr(kind, side) is not None)
+            raise InputError(robot.id, "controller", self.summary, f"one for robots {place}: {known}")
+        self._require_class(robot)
         module, _, name = function.rpartition(".")
         design: Callable[[Any, Specification, Progress], TrackingDesign]
         design = getattr(import_module(f"quasilpv.synthesis.{module}"), name)
         return design(robot, specification, progress)
+
+    def _require_class(self, robot: AnyRobot) -> None:
+        """InputError: it is for robots in space of another class."""
+        from quasilpv.systems.robots.spatial_robot import SpatialRobot  # noqa: PLC0415 -- help pages ask for no robot
+
+        if isinstance(robot, SpatialRobot) and robot.arm_class not in self.arm_classes:
+            from quasilpv.synthesis.elastic.classes import require_class  # noqa: PLC0415
+
+            own = next(name for name, kind in CONTROLLERS.items() if kind is self)
+            others = [name for name, kind in CONTROLLERS.items() if robot.arm_class in kind.arm_classes]
+            require_class(robot, own, self.arm_classes, others)
 
 
 CONTROLLERS: Mapping[str, ControllerKind] = {
@@ -109,6 +124,12 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
         "dob-torque for the equations of motion times the robot's own matrix beta (Dehak 2022, IV.5.2)",
         "torque.law.premultiplied_torque_law",
         rate_hz=4000.0,
+    ),
+    "motor-pid": ControllerKind(
+        "elastic joints with motor encoders: PID of the motors, inverse dynamics and elastic reference; positions only",
+        None,
+        in_space="elastic.motor_pid.motor_pid",
+        arm_classes=("elastic, motor encoders", "elastic, dual encoders"),
     ),
     "dob-moving": ControllerKind(
         "dob-acceleration with one Lyapunov function for all motions, proved; positions only",

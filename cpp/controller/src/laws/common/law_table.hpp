@@ -56,6 +56,13 @@ class LawTable : public MemberTable<Parameters> {
     });
   }
 
+  /// One positive number per joint.
+  void positive_joint_values(const char* name, JointArray Parameters::*at) {
+    this->add({name, "positive-joint-values"}, [at](const Field& field, int joints, Parameters& parameters) {
+      parameters.*at = read_joint_values(field, joints, [](const Field& value) { return value.positive(); });
+    });
+  }
+
   /// Gains on the premises of the inertia, `rows` n x `columns` n.
   void gains(const char* name, BlockPolytope Parameters::*at, int rows, int columns) {
     this->add({name, "polytope"}, [at, rows, columns](const Field& field, int joints, Parameters& parameters) {

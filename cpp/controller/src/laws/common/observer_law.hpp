@@ -34,7 +34,7 @@ class ObserverLaw : public ControlLaw {
       }
       start(measured);
     }
-    const ReferenceVectors<N> reference = reference_.accept(input.reference, report);
+    const ReferenceVectors<N> reference = shape(reference_.accept(input.reference, report));
     const JointVector<N> y = valid ? measured : state_.angle;
     const ModelSample<N> model = sample_model<N>(model_, y, report);
     if (valid) {
@@ -84,9 +84,14 @@ class ObserverLaw : public ControlLaw {
     state_ = ObserverState<N>::undisturbed(measured, first_speed_);
     first_speed_.setZero();  // of this start only
     reference_.reset(measured);
+    begin();
     started_ = true;
   }
 
+  /// Forgets what a law has beside the observer's state.
+  virtual void begin() noexcept {}
+  /// The reference of what is measured, from that of the joints: the same, unless a law knows what is between them.
+  virtual ReferenceVectors<N> shape(const ReferenceVectors<N>& reference) noexcept { return reference; }
   /// Corrects the estimate by what was measured; the premises are in the report.
   virtual void correct(const JointVector<N>& measured, StepReport& report, ObserverState<N>& state) noexcept = 0;
   /// The torque of this sample, before limits; the premises are in the report.

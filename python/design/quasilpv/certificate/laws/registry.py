@@ -14,6 +14,7 @@ from quasilpv.certificate.laws import (
     dob_acceleration,
     dob_torque,
     hinf_tracking,
+    motor_pid,
     pid,
     state_feedback,
 )
@@ -30,6 +31,7 @@ LAWS: Mapping[str, LawKind] = {
         state_feedback.LAW,
         descriptor_feedback.LAW,
         delayed_feedback.LAW,
+        motor_pid.LAW,
         pid.LAW,
         ctc.LAW,
         ctc.LAW_WITH_OBSERVER,

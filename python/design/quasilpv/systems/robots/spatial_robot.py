@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import isfinite
-from typing import Any
+from math import isfinite, sqrt
+from typing import Any, Literal
 
 import numpy as np
 
 from quasilpv.errors import InputError
 from quasilpv.systems.robots.arm_parameters import ActuatorLimits, OperatingDomain
+from quasilpv.systems.robots.joint_drive import ArmClass, ElasticDrive, arm_class
 from quasilpv.systems.robots.spatial import Placement, SpatialInertia
 from quasilpv.systems.robots.tree import KinematicTree
-from quasilpv.systems.robots.tree_mechanism import TreeMechanism
+from quasilpv.systems.robots.tree_mechanism import ElasticMechanism, TreeMechanism
 
 Interval = tuple[float, float]
 
@@ -36,6 +37,7 @@ class SpatialJoint:
         friction_viscous_nm_s, friction_coulomb_nm: of the true robot, as far as they are known.
         motion_angle_rad, motion_speed_rad_s: interval and largest speed that a proof in motion holds in; None for those
             above.
+        drive: a gear that gives; None for a rigid joint.
     """
 
     name: str
@@ -50,6 +52,7 @@ class SpatialJoint:
     friction_coulomb_nm: float
     motion_angle_rad: Interval | None = None
     motion_speed_rad_s: float | None = None
+    drive: ElasticDrive | None = None
 
 
 @dataclass(frozen=True)
@@ -206,17 +209,27 @@ class SpatialRobot:
         return self._with_friction(self.tree.carrying(self.payload.farthest(fraction)))
 
     def _with_friction(self, tree: KinematicTree) -> TreeMechanism:
-        return TreeMechanism(
-            tree,
-            tuple(joint.friction_viscous_nm_s for joint in self.joints),
-            tuple(joint.friction_coulomb_nm for joint in self.joints),
-        )
+        viscous = tuple(joint.friction_viscous_nm_s for joint in self.joints)
+        coulomb = tuple(joint.friction_coulomb_nm for joint in self.joints)
+        drives = [joint.drive for joint in self.joints if joint.drive is not None]
+        if not drives:
+            return TreeMechanism(tree, viscous, coulomb)
+        # The gears that are simulated are in the middle of their interval, with the least damping.
+        stiffness = tuple(sqrt(drive.stiffness_nm_rad[0] * drive.stiffness_nm_rad[1]) for drive in drives)
+        damping = tuple(drive.damping_least_s * pull for drive, pull in zip(drives, stiffness, strict=True))
+        side: Literal["motor", "link"] = "link" if drives[0].encoder_side == "link" else "motor"
+        return ElasticMechanism(tree, viscous, coulomb, stiffness, damping, side)
 
     @property
     def motion(self) -> tuple[tuple[Interval, ...], tuple[float, ...]]:
         """Intervals and largest speeds of the joints that a proof in motion holds in."""
         angles = tuple(joint.motion_angle_rad or joint.angle_rad for joint in self.joints)
         return angles, tuple(joint.motion_speed_rad_s or joint.speed_rad_s for joint in self.joints)
+
+    @property
+    def arm_class(self) -> ArmClass:
+        """What laws can be for it, by its joints' drives."""
+        return arm_class([joint.drive for joint in self.joints])
 
     @property
     def rubs(self) -> bool:

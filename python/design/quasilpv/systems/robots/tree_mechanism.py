@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -85,3 +85,24 @@ class TreeMechanism(Drawing):
             for joint, viscous, coulomb in rubbing
         ]
         return {**document, "label": label, "joints": joints}
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticMechanism(TreeMechanism):
+    """The same with gears that give, in simulations; friction is the motors'.
+
+    Attributes:
+        stiffness_nm_rad, damping_nm_s: of the gears, (n,).
+        encoder_side: what the encoders sit on.
+    """
+
+    stiffness_nm_rad: tuple[float, ...]
+    damping_nm_s: tuple[float, ...]
+    encoder_side: Literal["motor", "link"]
+
+    def plant_document(self, label: str) -> dict[str, Any]:
+        """See `TreeMechanism`."""
+        document = super().plant_document(label)
+        gears = zip(document["joints"], self.stiffness_nm_rad, self.damping_nm_s, strict=True)
+        joints = [{**joint, "stiffness_nm_rad": pull, "damping_nm_s": drag} for joint, pull, drag in gears]
+        return {**document, "kind": "elastic-tree", "encoder_side": self.encoder_side, "joints": joints}

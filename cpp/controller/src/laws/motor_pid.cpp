@@ -1,0 +1,140 @@
+// PID of the motors of elastic joints, with the inverse dynamics of the links fed forward.
+#include "laws/common/law_table.hpp"
+#include "laws/common/observer_law.hpp"
+
+namespace quasilpv {
+namespace {
+
+/// Scalars of the sampled law, the same for every joint. Errors are x - x_r: stabilising kp, kd and ki are negative.
+struct MotorPidParameters final : ObserverParameters {
+  struct Feedback {
+    double kp = 0.0;  ///< 1/s^2
+    double kd = 0.0;  ///< 1/s
+    double ki = 0.0;  ///< 1/s^3
+  };
+
+  MotorPidParameters() { filter_time_constant_s = 1.0; }  // of a disturbance that nothing feeds back
+
+  Feedback feedback;
+  std::array<double, 4> observer{};   ///< l1 (1), l2 (1/s), l3 (1/s^2), l4 (1/s^3)
+  JointArray rotor_inertia{};         ///< B, kg m^2, reflected to the joints
+  JointArray stiffness{};             ///< K of the gears, N m/rad
+  double correction_bandwidth = 0.0;  ///< of the reference's correction by the torque, rad/s; 0: none
+
+  std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
+};
+
+/// The measured angles y are the motors', reflected to the joints. With the inverse dynamics ID of the links along the
+/// reference, and x_hat = [th, w, a_d, j_d] of the motors:
+///
+///     tau_r  = ID(r, r', r'');   r_m = r + K^-1 tau_r + c_2,   r_m' = r',   r_m'' = r''  the reference of the motors
+///     x_hat += [l1, l2, l3, l4] (y - th)                                                current estimator
+///     a_cmd  = r'' + kp (th - r_m) + kd (w - r') + ki e_I
+///     Gamma  = B a_cmd + tau_r, limited
+///     e_I   += T (y - r_m)                                        anti-windup: see integrate_error()
+///     c_1   += (1 - p) (K^-1 (Gamma_applied - tau_r - B r'') - c_1);  c_2 += (1 - p) (c_1 - c_2),  p = exp(-w_c T)
+///     a_app  = B^-1 (Gamma_applied - tau_r) + a_d,  then as in DobAccelerationLaw
+///
+/// What the torque is beside the one fed forward winds the spring further: slowly, through two lags, the reference of
+/// the motors follows, so that the link comes back.
+/// The observer tells the speed; its disturbance is not fed back: the spring's torque is most of it.
+/// Source: Spong 1987, Modeling and control of elastic joint robots; De Luca and Book 2016, Springer Handbook of
+/// Robotics, section 11.1 (feedforward by the rigid inverse dynamics, elastic reference of the motors).
+template <int N>
+class MotorPidLaw final : public ObserverLaw<N> {
+ public:
+  MotorPidLaw(const MotorPidParameters& parameters, const LawSettings& settings)
+      : ObserverLaw<N>(parameters, settings),
+        parameters_(parameters),
+        rotor_(from_array<N>(parameters.rotor_inertia)),
+        stiffness_(from_array<N>(parameters.stiffness)),
+        correction_pole_(std::exp(-parameters.correction_bandwidth * settings.sample_period_s)) {}
+
+ private:
+  using typename ObserverLaw<N>::Motion;
+
+  void begin() noexcept override {
+    lagging_.setZero();
+    correction_.setZero();
+  }
+
+  ReferenceVectors<N> shape(const ReferenceVectors<N>& reference) noexcept override {
+    parameters_.model.tree->inverse_dynamics(reference.angle.data(), reference.speed.data(),
+                                             reference.acceleration.data(), fed_forward_.data());
+    ReferenceVectors<N> motors = reference;
+    motors.angle += fed_forward_.cwiseQuotient(stiffness_) + correction_;
+    return motors;
+  }
+
+  void correct(const JointVector<N>& measured, StepReport& /*report*/, ObserverState<N>& state) noexcept override {
+    const JointVector<N> innovation = measured - state.angle;
+    state.angle += parameters_.observer[0] * innovation;
+    state.speed += parameters_.observer[1] * innovation;
+    state.disturbance += parameters_.observer[2] * innovation;
+    state.disturbance_rate += parameters_.observer[3] * innovation;
+  }
+
+  Command<N> control(const ObserverState<N>& state, const ModelSample<N>& /*model*/,
+                     const ReferenceVectors<N>& reference, StepReport& /*report*/) noexcept override {
+    const JointVector<N> acceleration =
+        reference.acceleration + parameters_.feedback.kp * (state.angle - reference.angle) +
+        parameters_.feedback.kd * (state.speed - reference.speed) + parameters_.feedback.ki * state.integral_error;
+    return {rotor_.cwiseProduct(acceleration) + fed_forward_, JointVector<N>::Constant(parameters_.feedback.ki)};
+  }
+
+  Motion predict(const ObserverState<N>& state, const ModelSample<N>& /*model*/, const ReferenceVectors<N>& reference,
+                 StepReport& report) noexcept override {
+    const JointVector<N> torque = from_array<N>(report.torque_applied);
+    const JointVector<N> wound =
+        (torque - fed_forward_ - rotor_.cwiseProduct(reference.acceleration)).cwiseQuotient(stiffness_);
+    lagging_ += (1.0 - correction_pole_) * (wound - lagging_);
+    correction_ += (1.0 - correction_pole_) * (lagging_ - correction_);
+    return {(torque - fed_forward_).cwiseQuotient(rotor_) + state.disturbance, state.disturbance_rate};
+  }
+
+  MotorPidParameters parameters_;
+  JointVector<N> rotor_;
+  JointVector<N> stiffness_;
+  double correction_pole_;
+  JointVector<N> fed_forward_ = JointVector<N>::Zero();  // tau_r of this sample
+  JointVector<N> lagging_ = JointVector<N>::Zero();      // c_1
+  JointVector<N> correction_ = JointVector<N>::Zero();   // c_2
+};
+
+std::unique_ptr<ControlLaw> MotorPidParameters::make_law(const LawSettings& settings) const {
+  return make_law_of_size<MotorPidLaw>(*this, settings);
+}
+
+MemberTable<MotorPidParameters::Feedback> feedback_table() {
+  using F = MotorPidParameters::Feedback;
+  MemberTable<F> feedback;
+  feedback.number("kp", &F::kp);
+  feedback.number("kd", &F::kd);
+  feedback.number("ki", &F::ki);
+  return feedback;
+}
+
+void require_chain(const Field& law, MotorPidParameters& parameters) {
+  if (!parameters.model.tree) {
+    law["inertia"].fail("a table", "a chain of bodies, whose inverse dynamics is fed forward");
+  }
+}
+
+}  // namespace
+
+namespace laws {
+
+LawKind motor_pid() {
+  using P = MotorPidParameters;
+  LawTable<P> law("motor-pid", Inertia::kTableOrChain);
+  law.object("feedback", &P::feedback, feedback_table());
+  law.numbers("observer", &P::observer);
+  law.positive_joint_values("rotor_inertia_kg_m2", &P::rotor_inertia);
+  law.positive_joint_values("stiffness_nm_rad", &P::stiffness);
+  law.non_negative("correction_bandwidth_rad_s", &P::correction_bandwidth);
+  law.finish(require_chain);
+  return law.kind();
+}
+
+}  // namespace laws
+}  // namespace quasilpv

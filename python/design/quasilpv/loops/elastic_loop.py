@@ -1,0 +1,129 @@
+"""The frozen sampled loop of `motor-pid` on an arm with elastic joints: all joints together, for they do not decouple.
+
+At a posture, without gravity's gradient and Coulomb friction, links and motors are
+
+    M q'' = K (th - q) + D (v - w),    B th'' = B a(t - d) - K (th - q) - D (v - w)
+
+with a the commanded acceleration, held over a sample; its zero-order hold is exact, by the matrix exponential. The law
+of one joint is a fixed linear system from the motor's angle to a.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import block_diag, expm
+
+from quasilpv.arrays import FloatArray
+
+STATES = 7
+"""Of the law of one joint."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotorLaw:
+    """The numbers of `motor-pid` that decide its loop.
+
+    Attributes:
+        sample_period_s: T.
+        feedback: (kp, kd, ki), acting on x - x_r.
+        observer: (l1, l2, l3, l4).
+        rotors, stiffness: B and K as the law has them, (n,).
+        correction_rad_s: bandwidth of the correction of the motors' reference by the torque.
+    """
+
+    sample_period_s: float
+    feedback: FloatArray
+    observer: FloatArray
+    rotors: FloatArray
+    stiffness: FloatArray
+    correction_rad_s: float
+
+    def state_space(self, joint: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """``x+ = A x + b th``, ``a = c x + d th`` of a joint.
+
+        States: predicted angle, speed, disturbance and its rate, integral, and both lags of the correction.
+        """
+        T, rows = self.sample_period_s, np.eye(STATES + 1)
+        predicted, integral, lagging, correction, angle = rows[:4], rows[4], rows[5], rows[6], rows[7]
+        corrected = predicted + np.outer(self.observer, angle - predicted[0])
+        kp, kd, ki = self.feedback
+        command = kp * (corrected[0] - correction) + kd * corrected[1] + ki * integral
+        applied = command + corrected[2]
+        share = 1.0 - math.exp(-self.correction_rad_s * T)
+        lagging = lagging + share * (self.rotors[joint] / self.stiffness[joint] * command - lagging)
+        following = np.array(
+            [
+                corrected[0] + T * corrected[1] + T**2 / 2.0 * applied + T**3 / 6.0 * corrected[3],
+                corrected[1] + T * applied + T**2 / 2.0 * corrected[3],
+                corrected[2] + T * corrected[3],
+                corrected[3],
+                integral + T * (angle - correction),
+                lagging,
+                correction + share * (lagging - correction),
+            ]
+        )
+        return following[:, :STATES], following[:, STATES], command[:STATES], float(command[STATES])
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticPlant:
+    """An arm at a posture.
+
+    Attributes:
+        links: M, (n, n).
+        rotors, stiffness, damping: B, K, D, (n,).
+    """
+
+    links: FloatArray
+    rotors: FloatArray
+    stiffness: FloatArray
+    damping: FloatArray
+
+    def held(self, time_s: float, assumed_rotors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Transition of (q, th, w, v) over a time, and what a held command adds, (4 n, 4 n) and (4 n, n)."""
+        n = len(self.rotors)
+        pull, drag = np.diag(self.stiffness), np.diag(self.damping)
+        from_springs = np.block([[-pull, pull, -drag, drag], [pull, -pull, drag, -drag]])
+        inverse = np.linalg.inv(self.links)
+        accelerations = np.vstack([inverse @ from_springs[:n], from_springs[n:] / self.rotors[:, None]])
+        extended = np.zeros((5 * n, 5 * n))
+        extended[: 2 * n, 2 * n : 4 * n] = np.eye(2 * n)
+        extended[2 * n : 4 * n, : 4 * n] = accelerations
+        extended[3 * n : 4 * n, 4 * n :] = np.diag(assumed_rotors / self.rotors)
+        flow = expm(extended * time_s)
+        return flow[: 4 * n, : 4 * n], flow[: 4 * n, 4 * n :]
+
+
+def growth_rate(law: MotorLaw, plant: ElasticPlant, delay_s: float) -> float:
+    """``log(spectral radius) / T`` of the frozen loop, 1/s; negative when stable.
+
+    Args:
+        law: the scalars.
+        plant: the arm.
+        delay_s: transport delay.
+    """
+    n, T = len(plant.rotors), law.sample_period_s
+    whole = math.floor(delay_s / T + 1e-12)
+    late = max(0.0, delay_s - whole * T)
+    before, by_old = plant.held(late, law.rotors)
+    after, by_new = plant.held(T - late, law.rotors)
+    A, b, c, d = zip(*(law.state_space(joint) for joint in range(n)), strict=True)
+    angle = np.zeros((n, 4 * n))
+    angle[:, n : 2 * n] = np.eye(n)
+    states, old = (4 + STATES) * n, n * (whole + 1)
+    size = states + old
+    command = np.zeros((n, size))
+    command[:, : 4 * n] = np.diag(d) @ angle
+    command[:, 4 * n : states] = block_diag(*(row[None] for row in c))
+    on_its_way = [command, *np.eye(size)[states:].reshape(whole + 1, n, size)]
+    following = np.zeros((size, size))
+    following[: 4 * n, : 4 * n] = after @ before
+    following[: 4 * n] += by_new @ on_its_way[whole] + after @ by_old @ on_its_way[whole + 1]
+    following[4 * n : states, : 4 * n] = block_diag(*(column[:, None] for column in b)) @ angle
+    following[4 * n : states, 4 * n : states] = block_diag(*A)
+    for i in range(whole + 1):
+        following[states + i * n : states + (i + 1) * n] = on_its_way[i]
+    return float(np.log(np.abs(np.linalg.eigvals(following)).max()) / T)

@@ -1,0 +1,175 @@
+"""The law `motor-pid` for arms with elastic joints whose encoders sit on the motors.
+
+With ``M_n(q)`` on motor encoders no gains are known that are stable: above the resonance with its link a motor feels
+its own rotor only. So the feedback is that of the rotors, ``B (r'' + kp e + kd e' + ki int e)``, and what the links
+need is fed forward: their inverse dynamics along the reference, which also tells how far each spring will be wound,
+``r_m = r + K^-1 tau_r``. What the torque is beside that winds it further, and slowly corrects ``r_m``.
+
+The frozen loops of the joints do not decouple. What is looked at is a grid: postures x loads x stiffness x delay, each
+loop exactly. It proves nothing between its points, and the artifact claims nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from quasilpv.arrays import FloatArray
+from quasilpv.certificate.laws.motor_pid import MotorPidLaw
+from quasilpv.conditions.tracking.sampled_chains import observer_gains
+from quasilpv.errors import InfeasibleError, InputError
+from quasilpv.loops.elastic_loop import ElasticPlant, MotorLaw, growth_rate
+from quasilpv.progress import Progress, no_progress
+from quasilpv.synthesis.acceleration.tree_law import SEED, design_inertia
+from quasilpv.synthesis.specification import Specification
+from quasilpv.synthesis.tracking_design import TrackingDesign
+from quasilpv.systems.robots.joint_drive import ElasticDrive
+from quasilpv.systems.robots.spatial_robot import SpatialRobot
+from quasilpv.systems.robots.tree import KinematicTree
+
+POSTURES = 100
+
+
+@dataclass(frozen=True)
+class Gains:
+    """A choice of gains: kp = -kappa w_p, kd = -kappa, ki = -kappa w_p w_i; bandwidths of observer and correction."""
+
+    kappa: float
+    proportional: float
+    integral: float
+    observer: float
+    correction: float = 3.0
+
+    def feedback(self) -> FloatArray:
+        """(kp, kd, ki)."""
+        return -self.kappa * np.array([self.proportional, 1.0, self.proportional * self.integral])
+
+
+CHOICES = (Gains(700.0, 45.0, 4.0, 400.0), Gains(250.0, 45.0, 4.0, 1100.0), Gains(120.0, 30.0, 3.0, 900.0))
+"""Tried in this order: the stiffest that is stable on the grid is taken."""
+
+
+def motor_pid(robot: SpatialRobot, specification: Specification, progress: Progress = no_progress) -> TrackingDesign:
+    """Design `motor-pid`.
+
+    Args:
+        robot: all of its joints give, and their motors carry encoders.
+        specification: its rate and delay count; activity and margins do not.
+        progress: called with (choices tried, choices in all).
+
+    Raises:
+        InputError: a joint is rigid, or its encoder is on the link only.
+        InfeasibleError: no choice of gains is stable on the whole grid.
+    """
+    drives = elastic_drives(robot)
+    period = specification.sample_period_s
+    plants = list(_plants(robot, drives))
+    worst = float("inf")
+    for tried, choice in enumerate(CHOICES):
+        law = _law(robot, drives, choice, period)
+        delays = dict.fromkeys((0.0, specification.delay_s))
+        rates = [growth_rate(law, plant, delay) for plant in plants for delay in delays]
+        progress(tried + 1, len(CHOICES))
+        if max(rates) < 0.0:
+            grid = {"loops": len(rates), "worst_growth_rate_per_s": max(rates)}
+            return _design(robot, specification, choice, law, grid)
+        worst = min(worst, max(rates))
+    raise InfeasibleError(
+        f"{robot.id}: no motor-pid at {specification.rate_hz:g} Hz: of {len(CHOICES)} choices of gains the best grows "
+        f"by {worst:.3g} 1/s in a posture of the grid: its elastic modes are beyond the reach of this sample rate, or "
+        "need more damping (joints.NAME.damping_least)"
+    )
+
+
+def _law(robot: SpatialRobot, drives: tuple[ElasticDrive, ...], choice: Gains, period_s: float) -> MotorLaw:
+    return MotorLaw(
+        sample_period_s=period_s,
+        feedback=choice.feedback(),
+        observer=np.asarray(observer_gains(choice.observer, period_s).gains),
+        rotors=np.array([joint.rotor_inertia_kg_m2 for joint in robot.joints]),
+        stiffness=np.array([sqrt(drive.stiffness_nm_rad[0] * drive.stiffness_nm_rad[1]) for drive in drives]),
+        correction_rad_s=choice.correction,
+    )
+
+
+def elastic_drives(robot: SpatialRobot) -> tuple[ElasticDrive, ...]:
+    """The drives of an arm all of whose motors carry encoders.
+
+    Raises:
+        InputError: a joint is rigid, or its motor has none.
+    """
+    found = []
+    for joint in robot.joints:
+        if joint.drive is None:
+            expected = "a gear that gives: motor-pid is for arms all of whose joints are elastic"
+            raise InputError(robot.source, f"joints.{joint.name}.stiffness", "rigid", expected)
+        if joint.drive.encoder_side == "link":
+            expected = "motor or both: motor-pid reads the motors"
+            raise InputError(robot.source, f"joints.{joint.name}.encoder_side", "link", expected)
+        found.append(joint.drive)
+    return tuple(found)
+
+
+def links_of(tree: KinematicTree) -> KinematicTree:
+    """The chain without its rotors."""
+    return replace(tree, joints=tuple(replace(joint, rotor_inertia_kg_m2=0.0) for joint in tree.joints))
+
+
+def _plants(robot: SpatialRobot, drives: tuple[ElasticDrive, ...]) -> Iterator[ElasticPlant]:
+    """Postures x (lightest, heaviest) x (softest, stiffest) gears with their least damping x rotors at both ends."""
+    rng = np.random.default_rng(SEED)
+    low, high = np.array(robot.domain.angle_rad).T
+    postures = rng.uniform(low, high, (POSTURES, len(low)))
+    assumed = np.array([joint.rotor_inertia_kg_m2 for joint in robot.joints])
+    tolerance = np.array([joint.rotor_tolerance for joint in robot.joints])
+    for tree in (robot.lightest(), robot.heaviest()[0]):
+        inertias = links_of(tree).inertia(postures)
+        for end in (0, 1):
+            stiffness = np.array([drive.stiffness_nm_rad[end] for drive in drives])
+            damping = np.array([drive.damping_least_s for drive in drives]) * stiffness
+            for sign in (0.0,) if not tolerance.any() else (-1.0, 1.0):
+                rotors = assumed * (1.0 + sign * tolerance)
+                for links in inertias:
+                    yield ElasticPlant(links, rotors, stiffness, damping)
+
+
+def _design(
+    robot: SpatialRobot, specification: Specification, choice: Gains, law: MotorLaw, grid: dict[str, float]
+) -> TrackingDesign:
+    kp, kd, ki = (float(gain) for gain in law.feedback)
+    links = replace(robot, tree=links_of(robot.tree))
+    members: dict[str, Any] = {
+        "kind": MotorPidLaw.tag(),
+        "feedback": {"kp": kp, "kd": kd, "ki": ki},
+        "observer": [float(gain) for gain in law.observer],
+        "rotor_inertia_kg_m2": law.rotors.tolist(),
+        "stiffness_nm_rad": law.stiffness.tolist(),
+        "correction_bandwidth_rad_s": law.correction_rad_s,
+        **design_inertia(links, 1.0),
+    }
+    gears = [
+        {"stiffness_nm_rad": list(drive.stiffness_nm_rad), "damping_least_s": drive.damping_least_s}
+        for drive in elastic_drives(robot)
+    ]
+    return TrackingDesign(
+        controller=MotorPidLaw.tag(),
+        robot=robot,
+        sample_period_s=specification.sample_period_s,
+        law=members,
+        expressions={},
+        inputs={"controller": MotorPidLaw.tag(), "specification": specification.to_document(), "gears": gears},
+        report={
+            "arm_class": str(robot.arm_class),
+            "evidence": "grid",
+            **grid,
+            "kappa_per_s": choice.kappa,
+            "proportional_rad_s": choice.proportional,
+            "integral_rad_s": choice.integral,
+            "observer_bandwidth_rad_s": choice.observer,
+            "correction_bandwidth_rad_s": choice.correction,
+        },
+    )
