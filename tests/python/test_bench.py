@@ -35,6 +35,7 @@ LAYERS = (
     "model",
     "certificate",
     "footprint",
+    pytest.param("systems", marks=pytest.mark.full),
 )
 
 

@@ -432,6 +432,11 @@ def test_options_of_systems_are_refused_for_robots_and_artifacts_of_robots_for_s
     path, _ = write_artifact(tmp_path, release(DesignRequest.of("arm2", "pid")).artifact)
     assert run(["simulate", str(path)]) == 2
     assert "design track" in capsys.readouterr().err
+    other = tmp_path / "system.json"
+    other.write_bytes(canonical_json(released("two-tanks").to_document()))
+    for verb in (["robust", str(other)], ["hil", "serial-square", "--artifact", str(other)]):
+        assert run(verb) == 2
+        assert "one of a robot; of systems: verify, inspect, simulate, export" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

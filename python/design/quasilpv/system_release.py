@@ -97,7 +97,16 @@ def _searched(request: RegionalRequest, allow_unproved_rate: bool, progress: Pro
 def _at_some_rate(request: RegionalRequest, allow_unproved_rate: bool, progress: Progress) -> _Sampled:
     """The same for one factoring, at the rate that was asked for or one that is proved. Errors: `release_system`."""
     if request.rate_hz is not None:
-        return _search(request, allow_unproved_rate, progress)
+        try:
+            return _search(request, allow_unproved_rate, progress)
+        except InfeasibleError:
+            if request.unbounded is None:
+                raise
+        # Closed loops slow enough for this rate, which alone bound the region, do not exist: faster ones may.
+        faster = _at_some_rate(replace(request, rate_hz=None), allow_unproved_rate, progress)
+        if allow_unproved_rate:
+            return faster.at(request.rate_hz)
+        raise _NotProvedError(_not_proved(request, faster), faster)
     refusal: Exception | None = None
     for rate_hz in RATES_HZ:
         try:
@@ -144,15 +153,18 @@ def _search(request: RegionalRequest, allow_unproved_rate: bool, progress: Progr
         assert refusal is not None  # there is at least one candidate
         raise refusal
     best = max(tried, key=lambda each: each.longest_s)
+    raise _NotProvedError(_not_proved(request, best), best)
+
+
+def _not_proved(request: RegionalRequest, best: _Sampled) -> str:
+    """Why a rate is refused, and what to do, in one line."""
     name, asked = request.system.name, 1.0 / request.sample_period_s
     if best.longest_s == 0.0:
         reason = best.reason or "the bounds over the region are too wide"
-        message = f"{name}: no sampling rate is proved: {reason}; --allow-unproved-rate releases {asked:g} Hz"
-        raise _NotProvedError(message, best)
-    raise _NotProvedError(
+        return f"{name}: no sampling rate is proved: {reason}; --allow-unproved-rate releases {asked:g} Hz"
+    return (
         f"{name}: {asked:g} Hz is not proved; {_next_rate(1.0 / best.longest_s):g} Hz would be (--rate-hz), or less "
-        "input, decay or domain; --allow-unproved-rate releases it unproved",
-        best,
+        "input, decay or domain; --allow-unproved-rate releases it unproved"
     )
 
 

@@ -11,7 +11,9 @@ from quasilpv.artifact.envelope import envelope_summary
 from quasilpv.artifact.schema import Artifact
 from quasilpv.documents.canonical import canonical_cbor, canonical_json, member_path, parse_document
 from quasilpv.documents.mechanism import Tree
+from quasilpv.documents.system_artifact import SCHEMA as SYSTEM_SCHEMA
 from quasilpv.documents.tables import PolytopeTable
+from quasilpv.errors import InputError
 from quasilpv.files import read_bytes, write_atomically
 
 JSON_NAME = "artifact.json"
@@ -50,7 +52,15 @@ def read_artifact(path: Path | str) -> Artifact:
         InputError: the file is missing, damaged, not canonical, or not a valid artifact.
     """
     source = str(path)
-    return Artifact.from_document(parse_document(read_bytes(path), source), source)
+    document = parse_document(read_bytes(path), source)
+    if document.get("schema") == SYSTEM_SCHEMA:
+        raise InputError(
+            source,
+            "schema",
+            "a controller of a system",
+            "one of a robot; of systems: verify, inspect, simulate, export",
+        )
+    return Artifact.from_document(document, source)
 
 
 def diff(left: Artifact, right: Artifact) -> list[Difference]:
