@@ -204,6 +204,8 @@ def test_when_an_arm_is_of_another_class_expect_motor_pid_refused_by_name() -> N
         synthesise(DesignRequest.of(small_robot(), "motor-pid"))
     with pytest.raises(InputError, match=r"motor-pid for an arm that is elastic, link encoders"):
         synthesise(DesignRequest.of(elastic_ur5(side="link"), "motor-pid"))
+    with pytest.raises(InputError, match=r"lag: .*motor-pid"):
+        synthesise(DesignRequest.of(replace(elastic_ur5(), lag_s=(0.0, 1e-3)), "motor-pid"))
     with pytest.raises(InputError, match=r"one for robots in the plane: "):
         synthesise(DesignRequest.of("arm3", "motor-pid"))
 

@@ -22,12 +22,15 @@ struct TreePlantParameters {
   std::string label;
   KinematicTree tree;
   std::vector<JointFriction> friction;  ///< one per joint
+  double lag_s = 0.0;                   ///< time constant of the drives, >= 0, the same for all joints
 };
 
-/// The robot as a plant, y = (q, w): joint coordinates (rad; m for a joint that slides) and their rates.
+/// The robot as a plant, y = (q, w): joint coordinates (rad; m for a joint that slides) and their rates; where the
+/// drives lag y = (q, w, u), u the torque they deliver, which begins as what holds the robot.
 ///
 ///     q' - w = 0
-///     M(q) w' + h(q, w) + f w + c tanh(w / w0) - torque = 0
+///     M(q) w' + h(q, w) + f w + c tanh(w / w0) - torque = 0,   torque = control + external, or u + external
+///     lag u' + u - control = 0
 ///
 /// M and h as in TreeDynamics. Source: Featherstone 2008, chapters 5 and 6.
 class TreePlant final : public Plant {
@@ -39,7 +42,7 @@ class TreePlant final : public Plant {
   const TreeDynamics& dynamics() const noexcept { return dynamics_; }
 
   int joints() const noexcept override { return dynamics_.joints(); }
-  int size() const noexcept override { return 2 * dynamics_.joints(); }
+  int size() const noexcept override { return (lags() ? 3 : 2) * dynamics_.joints(); }
   Eigen::VectorXd initial_state(const JointArray& angle, const JointArray& speed) const override;
   void residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept override;
   void jacobian(double t, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept override;
@@ -47,7 +50,10 @@ class TreePlant final : public Plant {
   PlantSample sample(double t, ConstVector y) const override;
 
  private:
+  bool lags() const noexcept { return parameters_.lag_s > 0.0; }
   TreeVector friction(ConstVector speed) const noexcept;
+  /// What acts on the joints: from the drives and from outside, N m.
+  TreeVector acting_torque(double t, ConstVector y) const noexcept;
 
   TreePlantParameters parameters_;
   TreeDynamics dynamics_;

@@ -31,10 +31,11 @@ JointArray joint_array(Plant::ConstVector x) noexcept {
 }
 
 TreePlantParameters read_tree_plant(const Field& field) {
-  field.only({"kind", "label", "gravity_m_s2", "joints"});
+  field.only({"kind", "label", "gravity_m_s2", "joints", "lag_s"});
   TreePlantParameters parameters;
   parameters.label = field["label"].text();
   parameters.tree = read_tree(field);
+  parameters.lag_s = field.has("lag_s") ? field["lag_s"].non_negative() : 0.0;
   const Field joints = field["joints"];
   for (std::size_t k = 0; k < joints.size(); ++k) {
     joints.at(k).only({"name", "kind", "rotation", "translation_m", "axis", "mass_kg", "first_moment_kg_m",
@@ -54,8 +55,22 @@ Eigen::VectorXd TreePlant::initial_state(const JointArray& angle, const JointArr
   const int n = joints();
   Eigen::VectorXd y(size());
   y.head(n) = Eigen::Map<const Eigen::VectorXd>(angle.data(), n);
-  y.tail(n) = Eigen::Map<const Eigen::VectorXd>(speed.data(), n);
+  y.segment(n, n) = Eigen::Map<const Eigen::VectorXd>(speed.data(), n);
+  if (lags()) {
+    const TreeVector rest = TreeVector::Zero(n);
+    dynamics_.torque_at_rest(angle.data(), rest.data(), y.data() + 2 * n);
+  }
   return y;
+}
+
+TreeVector TreePlant::acting_torque(double t, ConstVector y) const noexcept {
+  const int n = joints();
+  if (!lags()) {
+    const JointArray torque = joint_torque(t);
+    return Eigen::Map<const Eigen::VectorXd>(torque.data(), n);
+  }
+  const JointArray external = external_torque().at(t);
+  return y.tail(n) + Eigen::Map<const Eigen::VectorXd>(external.data(), n);
 }
 
 TreeVector TreePlant::friction(ConstVector speed) const noexcept {
@@ -69,11 +84,14 @@ TreeVector TreePlant::friction(ConstVector speed) const noexcept {
 
 void TreePlant::residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept {
   const int n = joints();
-  const JointArray torque = joint_torque(t);
-  residual.head(n) = y_dot.head(n) - y.tail(n);
+  residual.head(n) = y_dot.head(n) - y.segment(n, n);
   TreeVector moving(n);
   dynamics_.inverse_dynamics(y.data(), y.data() + n, y_dot.data() + n, moving.data());
-  residual.tail(n) = moving + friction(y.tail(n)) - Eigen::Map<const Eigen::VectorXd>(torque.data(), n);
+  residual.segment(n, n) = moving + friction(y.segment(n, n)) - acting_torque(t, y);
+  if (lags()) {
+    residual.tail(n) =
+        parameters_.lag_s * y_dot.tail(n) + y.tail(n) - Eigen::Map<const Eigen::VectorXd>(torque().data(), n);
+  }
 }
 
 void TreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept {
@@ -86,12 +104,15 @@ void TreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVector y_
     const double slope = 1.0 / std::cosh(std::min(std::abs(y[n + k]) / own.coulomb_speed_rad_s, 300.0));
     by_speed(k, k) += own.viscous_nm_s + own.coulomb_nm / own.coulomb_speed_rad_s * slope * slope;
   }
-  jacobian.topLeftCorner(n, n).setIdentity();
-  jacobian.topLeftCorner(n, n) *= c_j;
-  jacobian.topRightCorner(n, n).setIdentity();
-  jacobian.topRightCorner(n, n) *= -1.0;
-  jacobian.bottomLeftCorner(n, n) = by_coordinate;
-  jacobian.bottomRightCorner(n, n) = by_speed + c_j * dynamics_.inertia(y.data());
+  jacobian.setZero();
+  jacobian.topLeftCorner(n, n).diagonal().setConstant(c_j);
+  jacobian.block(0, n, n, n).diagonal().setConstant(-1.0);
+  jacobian.block(n, 0, n, n) = by_coordinate;
+  jacobian.block(n, n, n, n) = by_speed + c_j * dynamics_.inertia(y.data());
+  if (lags()) {
+    jacobian.block(n, 2 * n, n, n).diagonal().setConstant(-1.0);
+    jacobian.block(2 * n, 2 * n, n, n).diagonal().setConstant(1.0 + c_j * parameters_.lag_s);
+  }
 }
 
 void TreePlant::derivative(double t, ConstVector y, Vector y_dot) const {
@@ -102,19 +123,22 @@ void TreePlant::derivative(double t, ConstVector y, Vector y_dot) const {
   if (cholesky.info() != Eigen::Success || !(pivots.array() > kSmallestPivotRatio * mass.diagonal().array()).all()) {
     throw PlantError("tree '" + parameters_.label + "': singular mass matrix at t = " + format_number(t) + " s");
   }
-  const JointArray torque = joint_torque(t);
   const TreeVector rest = TreeVector::Zero(n);
   TreeVector motion(n);
   dynamics_.inverse_dynamics(y.data(), y.data() + n, rest.data(), motion.data());
-  y_dot.head(n) = y.tail(n);
-  y_dot.tail(n) = cholesky.solve(Eigen::Map<const Eigen::VectorXd>(torque.data(), n) - motion - friction(y.tail(n)));
+  y_dot.head(n) = y.segment(n, n);
+  y_dot.segment(n, n) = cholesky.solve(acting_torque(t, y) - motion - friction(y.segment(n, n)));
+  if (lags()) {
+    y_dot.tail(n) = (Eigen::Map<const Eigen::VectorXd>(torque().data(), n) - y.tail(n)) / parameters_.lag_s;
+  }
 }
 
 PlantSample TreePlant::sample(double t, ConstVector y) const {
   const int n = joints();
   Eigen::VectorXd y_dot(size());
   derivative(t, y, y_dot);
-  return {joint_array(y.head(n)), joint_array(y.tail(n)), joint_array(y_dot.tail(n)), external_torque().at(t)};
+  return {joint_array(y.head(n)), joint_array(y.segment(n, n)), joint_array(y_dot.segment(n, n)),
+          external_torque().at(t)};
 }
 
 namespace plants {

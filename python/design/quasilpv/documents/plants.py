@@ -56,12 +56,17 @@ class RubbingJoint(TreeJoint):
 
 
 class TreePlant(MechanismDocument, _Labelled):
-    """A robot in space, its payload merged into its last body; gravity in the axes of the base."""
+    """A robot in space, its payload merged into its last body; gravity in the axes of the base.
+
+    Attributes:
+        lag_s: time constant with which the drives follow their commands, the same for all joints.
+    """
 
     PAYLOADS = TreePayloads
 
     kind: Literal["tree"] = "tree"
     gravity_m_s2: Row
+    lag_s: NonNegative = 0.0
     # Whether rotations are rotations and bodies have positive energy, the simulator decides.
     chain: Annotated[tuple[RubbingJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
 

@@ -90,7 +90,7 @@ TAGS = (*MECHANISM_KINDS, "ida", "rk4", "mujoco")
 """The kinds that tell the cases of a union apart."""
 
 
-OPTIONAL = frozenset({"torque_limit_nm", "sensors.velocity_filter_time_constant_s"})
+OPTIONAL = frozenset({"torque_limit_nm", "sensors.velocity_filter_time_constant_s", "plant.lag_s"})
 """Members a scenario file may leave out, as files written before they were there do."""
 
 
@@ -130,6 +130,8 @@ class Scenario(StrictModel):
         joints = self.plant.joints
         if isinstance(self.integrator, MujocoIntegrator) and not isinstance(self.plant, TreePlant):
             raise FieldError("integrator.kind", "mujoco", f"ida or rk4 with a plant of kind {self.plant.kind}")
+        if isinstance(self.integrator, MujocoIntegrator) and isinstance(self.plant, TreePlant) and self.plant.lag_s:
+            raise FieldError("integrator.kind", "mujoco", "ida or rk4 with drives that lag")
         if self.torque_limit_nm is not None and len(self.torque_limit_nm) != joints:
             raise FieldError("torque_limit_nm", f"{len(self.torque_limit_nm)} entries", str(joints))
         for field in ("angle_rad", "speed_rad_s"):
@@ -147,6 +149,8 @@ class Scenario(StrictModel):
             del document["torque_limit_nm"]
         if not self.sensors.velocity_filter_time_constant_s:
             del document["sensors"]["velocity_filter_time_constant_s"]
+        if isinstance(self.plant, TreePlant) and not self.plant.lag_s:
+            del document["plant"]["lag_s"]
         return document
 
     @classmethod

@@ -62,10 +62,13 @@ def motor_pid(robot: SpatialRobot, specification: Specification, progress: Progr
         progress: called with (choices tried, choices in all).
 
     Raises:
-        InputError: a joint is rigid, or its encoder is on the link only.
+        InputError: a joint is rigid, its encoder is on the link only, or the drives lag.
         InfeasibleError: no choice of gains is stable on the whole grid.
     """
     drives = elastic_drives(robot)
+    if robot.lag_s[1] > 0.0:
+        expected = "0 for motor-pid: its loops on the grid have no lag of the motors' currents"
+        raise InputError(robot.source, "lag", list(robot.lag_s), expected)
     period = specification.sample_period_s
     plants = list(_plants(robot, drives))
     worst = float("inf")

@@ -199,26 +199,32 @@ class SpatialRobot:
     def with_payload_fraction(self, fraction: float) -> TreeMechanism:
         """The nominal robot with a share of its load in [0, 1], far out: see `PayloadBody.farthest`.
 
+        Its drives lag by that share of the way from the shortest to the longest lag.
+
         Raises:
             InputError: the fraction is outside [0, 1].
         """
         if not 0.0 <= fraction <= 1.0:
             raise InputError("payloads", "fraction", fraction, "a number in [0, 1]")
-        if self.payload is None or fraction == 0.0:
+        if fraction == 0.0:
             return self.model
-        return self._with_friction(self.tree.carrying(self.payload.farthest(fraction)))
+        tree = self.tree if self.payload is None else self.tree.carrying(self.payload.farthest(fraction))
+        return self._with_friction(tree, fraction)
 
-    def _with_friction(self, tree: KinematicTree) -> TreeMechanism:
+    def _with_friction(self, tree: KinematicTree, fraction: float = 0.0) -> TreeMechanism:
         viscous = tuple(joint.friction_viscous_nm_s for joint in self.joints)
         coulomb = tuple(joint.friction_coulomb_nm for joint in self.joints)
         drives = [joint.drive for joint in self.joints if joint.drive is not None]
         if not drives:
-            return TreeMechanism(tree, viscous, coulomb)
+            shortest, longest = self.lag_s
+            return TreeMechanism(tree, viscous, coulomb, shortest + fraction * (longest - shortest))
         # The gears that are simulated are in the middle of their interval, with the least damping.
         stiffness = tuple(sqrt(drive.stiffness_nm_rad[0] * drive.stiffness_nm_rad[1]) for drive in drives)
         damping = tuple(drive.damping_least_s * pull for drive, pull in zip(drives, stiffness, strict=True))
         side: Literal["motor", "link"] = "link" if drives[0].encoder_side == "link" else "motor"
-        return ElasticMechanism(tree, viscous, coulomb, stiffness, damping, side)
+        return ElasticMechanism(
+            tree, viscous, coulomb, stiffness_nm_rad=stiffness, damping_nm_s=damping, encoder_side=side
+        )
 
     @property
     def motion(self) -> tuple[tuple[Interval, ...], tuple[float, ...]]:

@@ -24,11 +24,13 @@ class TreeMechanism(Drawing):
         tree: the chain; its tool is what paths are for.
         friction_viscous_nm_s: torque per speed, (n,).
         friction_coulomb_nm: torque against the direction of motion, (n,).
+        lag_s: time constant of simulated drives.
     """
 
     tree: KinematicTree
     friction_viscous_nm_s: tuple[float, ...]
     friction_coulomb_nm: tuple[float, ...]
+    lag_s: float = 0.0
 
     @property
     def name(self) -> str:
@@ -84,7 +86,8 @@ class TreeMechanism(Drawing):
             }
             for joint, viscous, coulomb in rubbing
         ]
-        return {**document, "label": label, "joints": joints}
+        lag = {"lag_s": self.lag_s} if self.lag_s > 0.0 else {}
+        return {**document, **lag, "label": label, "joints": joints}
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +99,9 @@ class ElasticMechanism(TreeMechanism):
         encoder_side: what the encoders sit on.
     """
 
-    stiffness_nm_rad: tuple[float, ...]
-    damping_nm_s: tuple[float, ...]
-    encoder_side: Literal["motor", "link"]
+    stiffness_nm_rad: tuple[float, ...] = ()
+    damping_nm_s: tuple[float, ...] = ()
+    encoder_side: Literal["motor", "link"] = "motor"
 
     def plant_document(self, label: str) -> dict[str, Any]:
         """See `TreeMechanism`."""
