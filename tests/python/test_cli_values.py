@@ -57,7 +57,7 @@ VERB_ARGUMENTS = {
     "inspect": Call(("ARTIFACT",)),
     "verify": Call(("ARTIFACT",)),
     "robust": Call(("ARTIFACT",), stubs=("certificate.gate",)),
-    "export": Call(("ARTIFACT", "x.npz")),
+    "export": Call(("ARTIFACT",), {"--out": "x"}),
     "export-sdp": Call(("ARTIFACT",), {"--out": "x"}, stubs=("synthesis.shipped_problem.shipped_problem",)),
     "track": Call(("stabilise-arm2",), {"--controller": "pid"}, stubs=("cli.track.run_all",)),
     "animate": Call(("stabilise-arm2",), stubs=("cli.animate.progress",)),

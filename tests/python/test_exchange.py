@@ -96,13 +96,14 @@ def test_a_frozen_system_is_the_linearisation_of_its_equations() -> None:
 
 
 def test_what_cannot_be_exported_is_said_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(InputError, match=r"suffix: got \.txt, expected one of \.npz, \.mat, \.json"):
+    with pytest.raises(InputError, match="format: got txt, expected one of npz, mat, json"):
         ql.export(made(), tmp_path / "law.txt")
     with pytest.raises(InputError, match="premise: got q"):
         ql.state_space(made(), {"q": 1.0})
     path = made().write(tmp_path / "out")
-    assert run(["export", str(path), str(tmp_path / "law.mat")]) == 0
-    assert run(["export", str(path), str(tmp_path / "law.csv")]) == 2
+    assert run(["export", str(path), "-o", str(tmp_path / "law.mat")]) == 0
+    assert loadmat(str(tmp_path / "law.mat"))["gain_vertices"].shape[1:] == (1, 2)
+    assert run(["export", str(path), "-o", str(tmp_path / "law"), "--format", "csv"]) == 2
     assert capsys.readouterr().err.count("\n") == 2
 
 

@@ -24,7 +24,6 @@ WRONG_USES = {
     "solve ex-I.1": "command line: --condition: got nothing, expected a condition of design list (design solve --help)",
     "new": "command line: system|robot: got nothing, expected what to start (design new --help)",
     "new robot": "command line: DESCRIPTION: got nothing, expected the URDF or MJCF of the robot",
-    "new system -o mine.txt": "command line: --out: got mine.txt, expected a name that ends in .py",
     "new system arm.urdf": "command line: DESCRIPTION: got arm.urdf, expected nothing: it is for a robot",
     "synth arm3 --rate-hz fast": "command line: --rate-hz: got fast, expected a number (design synth --help)",
     "synth arm9": "robots: robot: got arm9, expected one of arm2, arm3, arm2-upright, arm3-light, fivebar, "

@@ -28,26 +28,28 @@ from quasilpv.system_chain import SystemController
 Exportable: TypeAlias = Law | SystemController | SystemArtifactDocument | Artifact
 Arrays: TypeAlias = dict[str, Any]
 
-SUFFIXES = (".npz", ".mat", ".json")
+FORMATS = ("npz", "mat", "json")
 
 
-def export(what: Exportable, path: Path | str) -> Path:
+def export(what: Exportable, path: Path | str, form: str | None = None) -> Path:
     """Write the gains of a law or an artifact, and the model where there is one, for other tools.
 
     Args:
         what: the law of an answer, a controller of a system, or an artifact.
-        path: ends in ``.npz`` (numpy), ``.mat`` (MATLAB 5) or ``.json``.
+        path: of the file.
+        form: ``npz`` (numpy), ``mat`` (MATLAB 5) or ``json``; as the path ends by default.
 
     Raises:
-        InputError: another suffix, or the file cannot be written.
+        InputError: there is no such format, or the file cannot be written.
     """
     path = Path(path)
-    if path.suffix not in SUFFIXES:
-        raise InputError(str(path), "suffix", path.suffix or "none", f"one of {', '.join(SUFFIXES)}")
+    own = path.suffix[1:] if form is None else form
+    if own not in FORMATS:
+        raise InputError(str(path), "format", own or "none", f"one of {', '.join(FORMATS)}")
     arrays, buffer = arrays_of(what), io.BytesIO()
-    if path.suffix == ".npz":
+    if own == "npz":
         np.savez(buffer, **arrays)
-    elif path.suffix == ".mat":
+    elif own == "mat":
         from scipy.io import savemat  # noqa: PLC0415 -- nobody else needs it
 
         savemat(buffer, arrays)

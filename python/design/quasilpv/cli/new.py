@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from quasilpv.cli.console import print_note
+from quasilpv.cli.console import JsonOption, print_json, print_note
 from quasilpv.errors import InputError
 from quasilpv.files import claim_file, write_atomically
 
@@ -56,6 +57,7 @@ def new_command(
         Path | None,
         typer.Option("--out", "-o", metavar="FILE", help="What to write.  [default: my_system.py, robot.toml]"),
     ] = None,
+    json: JsonOption = False,
 ) -> int:
     """Write a commented file to start from: equations of a system, or what a robot's description lacks.
 
@@ -67,20 +69,21 @@ def new_command(
       design new robot ur5.urdf -o ur5.toml
     """
     path = out or Path("my_system.py" if what == "system" else "robot.toml")
-    if path.exists():
+    if os.path.lexists(path):
         raise InputError(str(path), "file", "one that is there", "another name: -o FILE")
     if what == "robot":
         if description is None:
             raise InputError("command line", "DESCRIPTION", "nothing", "the URDF or MJCF of the robot")
         from quasilpv.cli.robot import robot_command
 
-        return robot_command("show", description, tip=tip, out=path)
+        return robot_command("show", description, tip=tip, out=path, json=json)
     for option, value in (("DESCRIPTION", description), ("--tip", tip)):
         if value is not None:
             raise InputError("command line", option, value, "nothing: it is for a robot")
-    if path.suffix != ".py":
-        raise InputError("command line", "--out", path, "a name that ends in .py")
     claim_file(path)
-    write_atomically({path: SYSTEM.format(file=path.name).encode()})
-    print_note(f"wrote {path}")
+    write_atomically({path: SYSTEM.format(file=path.name).encode(errors="surrogateescape")})
+    if json:
+        print_json({"file": str(path)})
+    else:
+        print_note(f"wrote {path}")
     return 0

@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -35,6 +36,7 @@ from quasilpv.certificate.exact.vertex_tables import VertexTable
 from quasilpv.documents.strict_model import FieldError
 from quasilpv.documents.system_artifact import AffineDocument, Signal, SystemArtifactDocument
 
+UNITS = "units"
 POINTS = 64
 ROUNDING = 1e-9
 _SEED = 2022
@@ -65,6 +67,15 @@ def bound_of(signal: Signal) -> float:
     return min(low, high)
 
 
+class Units(NamedTuple):
+    """Factors of states, inputs and equations, and of time: old units in a new one."""
+
+    states: tuple[fmpq, ...]
+    inputs: tuple[fmpq, ...]
+    equations: tuple[fmpq, ...]
+    time: fmpq
+
+
 @dataclass(frozen=True, eq=False)
 class _Claims:
     """The matrices of an artifact, exactly, in the units of its witness."""
@@ -80,17 +91,18 @@ class _Claims:
         return self.artifact.model.differential
 
     @cached_property
-    def units(self) -> dict[str, tuple[fmpq, ...]]:
-        """T of the states, S of the inputs, D of the equations, c of time."""
-        rows = self.artifact.witness.get("units", ())
+    def units(self) -> Units:
+        """In which the witness is written."""
+        rows = self.artifact.witness.get(UNITS, ())
         sizes = (self.n, len(self.artifact.inputs), self.n, 1)
         if tuple(len(row) for row in rows) != sizes or any(not value > 0.0 for row in rows for value in row):
             raise FieldError("witness.units", len(rows), f"positive factors in rows of {sizes}")
-        return {name: tuple(map(rational, row)) for name, row in zip("TSDc", rows, strict=True)}
+        states, inputs, equations, time = (tuple(map(rational, row)) for row in rows)
+        return Units(states, inputs, equations, time[0])
 
     @property
     def c(self) -> fmpq:
-        return self.units["c"][0]
+        return self.units.time
 
     @cached_property
     def alpha(self) -> fmpq:
@@ -98,7 +110,7 @@ class _Claims:
 
     @cached_property
     def P(self) -> fmpq_mat:
-        inverse = diagonal([1 / t for t in self.units["T"][: self.q]])
+        inverse = diagonal([1 / t for t in self.units.states[: self.q]])
         return inverse * matrix(self.artifact.region.lyapunov) * inverse
 
     @cached_property
@@ -122,7 +134,7 @@ class _Claims:
         return vertices
 
     def _vertices(self, affine: AffineDocument, columns: Sequence[fmpq], factor: fmpq) -> list[fmpq_mat]:
-        left, right = diagonal([factor * d for d in self.units["D"]]), diagonal(columns)
+        left, right = diagonal([factor * d for d in self.units.equations]), diagonal(columns)
         constant, slopes = matrix(affine.constant), [matrix(slope) for slope in affine.coefficients]
         return [
             left * sum((z * slope for z, slope in zip(point, slopes, strict=True)), constant) * right
@@ -131,21 +143,21 @@ class _Claims:
 
     @cached_property
     def E(self) -> list[fmpq_mat]:
-        return self._vertices(self.artifact.model.E, self.units["T"], 1 / self.c)
+        return self._vertices(self.artifact.model.E, self.units.states, 1 / self.c)
 
     @cached_property
     def A(self) -> list[fmpq_mat]:
-        return self._vertices(self.artifact.model.A, self.units["T"], fmpq(1))
+        return self._vertices(self.artifact.model.A, self.units.states, fmpq(1))
 
     @cached_property
     def B(self) -> list[fmpq_mat]:
-        return self._vertices(self.artifact.model.B, self.units["S"], fmpq(1))
+        return self._vertices(self.artifact.model.B, self.units.inputs, fmpq(1))
 
     @cached_property
     def M(self) -> list[fmpq_mat]:
         """``K_j P`` of the shipped gains."""
-        left = diagonal([1 / s for s in self.units["S"]])
-        right = diagonal(self.units["T"][: self.q])
+        left = diagonal([1 / s for s in self.units.inputs])
+        right = diagonal(self.units.states[: self.q])
         return [left * K * right * self.P for K in self.table.vertices()]
 
     def witness(self, name: str, rows: int, columns: int) -> fmpq_mat:
@@ -200,7 +212,7 @@ class _Claims:
             if bound == inf:
                 continue
             if k < self.q:
-                limit = (rational(bound) / self.units["T"][k]) ** 2
+                limit = (rational(bound) / self.units.states[k]) ** 2
                 yield Claim.at_most(f"state {signal.name} in its domain", self.P[k, k], limit)
             else:
                 yield from self._algebraic(signal, k, bound)
@@ -210,7 +222,7 @@ class _Claims:
         number = k - q
         Y, Z = self.witness(f"Y {number}", a, q), self.witness(f"Z2 {number}", a, a)
         chosen = matrix([[int(column == number) for column in range(a)]])
-        limit = matrix([[(rational(bound) / self.units["T"][k]) ** 2]])
+        limit = matrix([[(rational(bound) / self.units.states[k]) ** 2]])
 
         def entry(i: int, j: int) -> fmpq_mat:
             A, B = _rows(self.A[i], q, self.n), _rows(self.B[i], q, self.n)
@@ -230,7 +242,7 @@ class _Claims:
         for k, signal in enumerate(self.artifact.inputs):
             bound = bound_of(signal)
             if bound < inf:
-                limit = matrix([[(rational(bound) / self.units["S"][k]) ** 2]])
+                limit = matrix([[(rational(bound) / self.units.inputs[k]) ** 2]])
 
                 def entry(_: int, j: int, limit: fmpq_mat = limit, k: int = k) -> fmpq_mat:
                     row = _rows(self.M[j], k, k + 1)
