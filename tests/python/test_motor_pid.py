@@ -21,7 +21,7 @@ from quasilpv.loops.elastic_loop import ElasticPlant, MotorLaw, growth_rate
 from quasilpv.release import checked_artifact
 from quasilpv.scenarios import build_scenario
 from quasilpv.scenarios.registry import tracking_experiment
-from quasilpv.synthesis import DesignRequest, synthesise
+from quasilpv.synthesis import DesignRequest, default_controller, synthesise
 from quasilpv.synthesis.elastic import motor_pid
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
 from quasilpv.systems.robots.ur5 import ur5
@@ -197,6 +197,14 @@ def test_when_a_law_for_rigid_joints_reads_motor_encoders_expect_it_refused_and_
     # It ends in a cycle between the torque limits: the motors shake while the reference has hardly begun to move.
     assert int(np.bitwise_or.reduce(run["flags"].astype(int))) & TORQUE_SATURATED
     assert np.abs(run["measured_speed_rad_s"]).max() > 10.0 * np.abs(run["reference_speed_rad_s"]).max()
+
+
+def test_when_nobody_asks_for_a_controller_expect_that_of_the_class() -> None:
+    assert default_controller(elastic_ur5()) == "motor-pid"
+    assert default_controller(elastic_ur5(side="both")) == "motor-pid"
+    assert default_controller(ur5()) == "dob-acceleration"
+    with pytest.raises(InputError, match=r"an arm that is elastic, link encoders, expected one that is rigid or"):
+        default_controller(elastic_ur5(side="link"))
 
 
 def test_when_an_arm_is_of_another_class_expect_motor_pid_refused_by_name() -> None:

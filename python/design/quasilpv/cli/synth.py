@@ -23,7 +23,7 @@ from quasilpv.cli.parameters import SetOption
 from quasilpv.cli.systems import names_a_system, numbers_by_name, print_system, write_system
 from quasilpv.errors import InputError
 from quasilpv.files import claim_folder
-from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, DesignRequest
+from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, DesignRequest, default_controller
 
 
 def synth_command(
@@ -37,9 +37,13 @@ def synth_command(
     ],
     *,
     controller: Annotated[
-        str,
-        typer.Option("--design", help=f"Controller: {', '.join(CONTROLLERS)}; for short {' or '.join(SHORT_NAMES)}."),
-    ] = DEFAULT_CONTROLLER,
+        str | None,
+        typer.Option(
+            "--design",
+            help=f"Controller: {', '.join(CONTROLLERS)}; for short {' or '.join(SHORT_NAMES)}."
+            f"  [default: {DEFAULT_CONTROLLER}; of an arm with elastic joints, by its class]",
+        ),
+    ] = None,
     rate_hz: RateOption = None,
     encoder_bits: EncoderOption = None,
     margin_spare: SpareOption = None,
@@ -114,7 +118,7 @@ def synth_command(
             "--margin-spare": margin_spare,
             "--torque-activity": torque_activity,
             "--allow-unverified": allow_unverified or None,
-            "--design": None if controller == DEFAULT_CONTROLLER else controller,
+            "--design": controller,
         }
         _refuse(of_robots, robot_id, "a robot")
         wanted = {
@@ -139,9 +143,12 @@ def synth_command(
         return
     _refuse(of_systems, robot_id, "a system")
     source = robot_named(robot_id)
+    chosen = default_controller(source) if controller is None else require_controller(controller)
+    if controller is None and chosen != DEFAULT_CONTROLLER:
+        print_note(f"{source.id} is {getattr(source, 'arm_class', 'of a class of its own')}: {chosen}")
     request = requested(
         source,
-        require_controller(controller),
+        chosen,
         rate_hz,
         encoder_bits,
         margin_spare=margin_spare,

@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING
 
 from quasilpv.errors import InputError
 from quasilpv.progress import Progress, no_progress
-from quasilpv.synthesis.registry import CONTROLLERS, DEFAULT_CONTROLLER, ControllerKind, controller_kind
+from quasilpv.synthesis.registry import (
+    CONTROLLERS,
+    DEFAULT_CONTROLLER,
+    ControllerKind,
+    controller_kind,
+    default_controller,
+)
 from quasilpv.synthesis.request import DesignRequest, specification_for
 from quasilpv.synthesis.specification import Specification
 
@@ -24,6 +30,7 @@ __all__ = [
     "DesignRequest",
     "Specification",
     "controller_kind",
+    "default_controller",
     "specification_for",
     "synthesise",
     "without_compensation",

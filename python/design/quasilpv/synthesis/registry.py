@@ -153,3 +153,20 @@ def controller_kind(controller: str) -> ControllerKind:
         InputError: there is none; the message lists those there are.
     """
     return look_up(CONTROLLERS, controller, "controllers", "controller")
+
+
+def default_controller(robot: AnyRobot) -> str:
+    """The controller of a robot if nobody asks for another: for robots in space by the class of their joints.
+
+    Raises:
+        InputError: there is none for its class.
+    """
+    from quasilpv.systems.robots.spatial_robot import SpatialRobot  # noqa: PLC0415 -- help pages ask for no robot
+
+    if not isinstance(robot, SpatialRobot) or robot.arm_class in CONTROLLERS[DEFAULT_CONTROLLER].arm_classes:
+        return DEFAULT_CONTROLLER
+    for name, kind in CONTROLLERS.items():
+        if robot.arm_class in kind.arm_classes:
+            return name
+    known = dict.fromkeys(str(own) for kind in CONTROLLERS.values() for own in kind.arm_classes)
+    raise InputError(robot.source, "joints", f"an arm that is {robot.arm_class}", f"one that is {' or '.join(known)}")
