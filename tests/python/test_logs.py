@@ -26,7 +26,7 @@ from quasilpv.experiments.track import track
 from quasilpv.release import release
 from quasilpv.scenarios import Sensors, TrackingExperiment, build_scenario
 from quasilpv.synthesis import DesignRequest, Specification
-from quasilpv.systems.robots.registry import robot, robots
+from quasilpv.systems.robots.registry import all_robots, any_robot
 from quasilpv.telemetry import LOG_NAME, Event, RunLog, read_events, read_log, write_events
 from quasilpv.telemetry.message_types import CHANNELS, channel_type, message_type, parse_definition
 from quasilpv.telemetry.replay import replay
@@ -219,11 +219,11 @@ def test_when_a_run_is_repeated_expect_the_same_log_byte_for_byte(
 
 
 @pytest.mark.parametrize(("kind", "payload"), [("nominal", 0.0), ("perturbed", 1.0)])
-@pytest.mark.parametrize("name", [entry.id for entry in robots()])
+@pytest.mark.parametrize("name", [entry.id for entry in all_robots()])
 def test_when_a_robot_is_rebuilt_from_its_plant_document_expect_the_same_plant(
     name: str, kind: Literal["nominal", "perturbed"], payload: float
 ) -> None:
-    entry = robot(name)
+    entry = any_robot(name)
     plant = entry.with_payload_fraction(payload)
     scenario = build_scenario(entry, rest("still", plant.joints, 1.0), plant=kind, external_torque=())
     rebuilt = mechanism_of(scenario.plant)

@@ -16,6 +16,7 @@ from quasilpv.cli import run
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.experiments.designs import kept_design
+from quasilpv.experiments.logged import logged_result
 from quasilpv.experiments.mujoco_plant import MujocoPlant
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.experiments.track import track
@@ -32,6 +33,7 @@ from quasilpv.scenarios import (
 from quasilpv.synthesis import DesignRequest
 from quasilpv.systems.robots.registry import any_robot
 from quasilpv.systems.robots.tree_mechanism import TreeMechanism
+from quasilpv.telemetry import LOG_NAME, read_log
 from quasilpv.trajectories import Trajectory
 from reference.random_trees import random_tree
 
@@ -149,11 +151,13 @@ def test_a_closed_loop_on_mujoco_is_that_on_ida_to_what_encoders_and_integrators
     experiment = replace(tracking_experiment("ur5-square"), name="short", reference=reference)
     artifact = kept_design(DesignRequest.of(robot), folder=tmp_path)
     ida, other = (
-        track(RunSetup(experiment, artifact, plant=plant, log=False), tmp_path / plant)
-        for plant in ("perturbed", "mujoco")
+        track(RunSetup(experiment, artifact, plant=plant), tmp_path / plant) for plant in ("perturbed", "mujoco")
     )
     assert (ida.plant, other.plant) == ("perturbed", "mujoco")
     assert mujoco.get_mjcb_passive() is None
+    logged = logged_result(read_log(tmp_path / "mujoco" / LOG_NAME))  # the tool is the robot's there, too
+    assert logged.metrics == other.metrics
+    assert logged.plant == "mujoco"
     difference = np.abs(ida.run.true_angle_rad - other.run.true_angle_rad).max()
     assert 0.0 < difference < 1e-5
     assert other.metrics.rms_tool_m == pytest.approx(ida.metrics.rms_tool_m, rel=0.02)
@@ -173,6 +177,8 @@ def test_the_simulator_has_no_mujoco_and_says_who_has() -> None:
     document = scenario_of(robot, MujocoIntegrator(), np.zeros(6)).to_document()
     with pytest.raises(InputError, match=r"integrator.kind: got mujoco, expected ida or rk4"):
         _runtime.PlantSession(_runtime.Scenario.parse(canonical_json(document)), T)
+    del document["plant"]["tool"]  # as files have it that were written before
+    assert Scenario.from_document(document).to_document() == document
     document["integrator"]["steps_per_sample"] = 0
     with pytest.raises(InputError, match="steps_per_sample"):
         _runtime.Scenario.parse(canonical_json(document))

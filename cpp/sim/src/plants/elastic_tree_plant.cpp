@@ -27,7 +27,7 @@ Eigen::Map<const TreeVector> as_vector(const JointArray& values, int joints) noe
 }
 
 ElasticTreeParameters read_elastic_tree(const Field& field) {
-  field.only({"kind", "label", "gravity_m_s2", "encoder_side", "joints"});
+  field.only({"kind", "label", "gravity_m_s2", "encoder_side", "joints", "tool"});
   ElasticTreeParameters parameters;
   parameters.label = field["label"].text();
   parameters.tree = read_tree(field);

@@ -31,7 +31,8 @@ JointArray joint_array(Plant::ConstVector x) noexcept {
 }
 
 TreePlantParameters read_tree_plant(const Field& field) {
-  field.only({"kind", "label", "gravity_m_s2", "joints", "lag_s"});
+  // Where the tool is, no motion depends on.
+  field.only({"kind", "label", "gravity_m_s2", "joints", "lag_s", "tool"});
   TreePlantParameters parameters;
   parameters.label = field["label"].text();
   parameters.tree = read_tree(field);

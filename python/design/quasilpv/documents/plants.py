@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from quasilpv.documents.mechanism import FiveBarLinks, MechanismDocument, Row, SerialLinks, SpringDisc, TreeJoint
+from quasilpv.documents.mechanism import FiveBarLinks, MechanismDocument, Row, Rows, SerialLinks, SpringDisc, TreeJoint
 from quasilpv.documents.payloads import TreePayloads
 from quasilpv.documents.programs import MAX_JOINTS
 from quasilpv.documents.strict_model import NonNegative, Positive, StrictModel
@@ -55,11 +55,19 @@ class RubbingJoint(TreeJoint):
     coulomb_speed_rad_s: Positive
 
 
+class ToolFrame(StrictModel):
+    """Where a robot in space has its tool, in the frame of its last joint: rows of the rotation, and the place."""
+
+    rotation: Rows
+    translation_m: Row
+
+
 class TreePlant(MechanismDocument, _Labelled):
     """A robot in space, its payload merged into its last body; gravity in the axes of the base.
 
     Attributes:
         lag_s: time constant with which the drives follow their commands, the same for all joints.
+        tool: for errors and figures; None (not in files of old): the last joint.
     """
 
     PAYLOADS = TreePayloads
@@ -69,6 +77,7 @@ class TreePlant(MechanismDocument, _Labelled):
     lag_s: NonNegative = 0.0
     # Whether rotations are rotations and bodies have positive energy, the simulator decides.
     chain: Annotated[tuple[RubbingJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
+    tool: ToolFrame | None = None
 
     @property
     def joints(self) -> int:
@@ -94,6 +103,7 @@ class ElasticTreePlant(MechanismDocument, _Labelled):
 
     Attributes:
         encoder_side: what the encoders sit on.
+        tool: as of a `TreePlant`.
     """
 
     PAYLOADS = TreePayloads
@@ -102,6 +112,7 @@ class ElasticTreePlant(MechanismDocument, _Labelled):
     gravity_m_s2: Row
     encoder_side: Literal["motor", "link"]
     chain: Annotated[tuple[ElasticJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
+    tool: ToolFrame | None = None
 
     @property
     def joints(self) -> int:

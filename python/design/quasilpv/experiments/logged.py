@@ -105,8 +105,11 @@ def _tree(plant: TreePlant | ElasticTreePlant) -> TreeMechanism:
         )
         for joint in plant.chain
     )
+    tool = Placement.identity()
+    if plant.tool is not None:
+        tool = Placement(np.array(plant.tool.rotation), np.array(plant.tool.translation_m))
     return TreeMechanism(
-        KinematicTree(plant.label, joints, Placement.identity(), np.array(plant.gravity_m_s2)),
+        KinematicTree(plant.label, joints, tool, np.array(plant.gravity_m_s2)),
         tuple(joint.friction_viscous_nm_s for joint in plant.chain),
         tuple(joint.friction_coulomb_nm for joint in plant.chain),
     )

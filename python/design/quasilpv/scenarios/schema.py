@@ -18,7 +18,7 @@ from quasilpv.documents.canonical import (
     require_bounded,
 )
 from quasilpv.documents.mechanism import MECHANISM_KINDS
-from quasilpv.documents.plants import Plant, TreePlant
+from quasilpv.documents.plants import ElasticTreePlant, Plant, TreePlant
 from quasilpv.documents.strict_model import LARGEST_NUMBER, FieldError, NonNegative, Positive, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import read_bytes, write_readable_json
@@ -90,7 +90,7 @@ TAGS = (*MECHANISM_KINDS, "ida", "rk4", "mujoco")
 """The kinds that tell the cases of a union apart."""
 
 
-OPTIONAL = frozenset({"torque_limit_nm", "sensors.velocity_filter_time_constant_s", "plant.lag_s"})
+OPTIONAL = frozenset({"torque_limit_nm", "sensors.velocity_filter_time_constant_s", "plant.lag_s", "plant.tool"})
 """Members a scenario file may leave out, as files written before they were there do."""
 
 
@@ -132,6 +132,8 @@ class Scenario(StrictModel):
             raise FieldError("integrator.kind", "mujoco", f"ida or rk4 with a plant of kind {self.plant.kind}")
         if isinstance(self.integrator, MujocoIntegrator) and isinstance(self.plant, TreePlant) and self.plant.lag_s:
             raise FieldError("integrator.kind", "mujoco", "ida or rk4 with drives that lag")
+        if isinstance(self.integrator, MujocoIntegrator) and isinstance(self.plant, TreePlant) and self.plant.lag_s:
+            raise FieldError("integrator.kind", "mujoco", "ida or rk4 with drives that lag")
         if self.torque_limit_nm is not None and len(self.torque_limit_nm) != joints:
             raise FieldError("torque_limit_nm", f"{len(self.torque_limit_nm)} entries", str(joints))
         for field in ("angle_rad", "speed_rad_s"):
@@ -147,6 +149,8 @@ class Scenario(StrictModel):
         document: Document = normalise(self.model_dump(mode="json", by_alias=True), self.name)
         if self.torque_limit_nm is None:
             del document["torque_limit_nm"]
+        if isinstance(self.plant, TreePlant | ElasticTreePlant) and self.plant.tool is None:
+            del document["plant"]["tool"]
         if not self.sensors.velocity_filter_time_constant_s:
             del document["sensors"]["velocity_filter_time_constant_s"]
         if isinstance(self.plant, TreePlant) and not self.plant.lag_s:

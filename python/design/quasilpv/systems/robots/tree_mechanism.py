@@ -87,7 +87,9 @@ class TreeMechanism(Drawing):
             for joint, viscous, coulomb in rubbing
         ]
         lag = {"lag_s": self.lag_s} if self.lag_s > 0.0 else {}
-        return {**document, **lag, "label": label, "joints": joints}
+        tool = self.tree.tool
+        place = {"rotation": tool.rotation.tolist(), "translation_m": tool.translation_m.tolist()}
+        return {**document, **lag, "label": label, "joints": joints, "tool": place}
 
 
 @dataclass(frozen=True, eq=False)
