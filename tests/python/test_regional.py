@@ -180,6 +180,31 @@ def test_the_enclosed_slope_is_above_every_sampled_one() -> None:
     assert loop.bound.lipschitz <= 6.0 * largest  # and not far above
 
 
+def with_algebraic(equation: str) -> ql.DescriptorSystem:
+    """A tank whose outflow, algebraic, is nonlinear in itself."""
+    return ql.DescriptorSystem.from_equations(
+        ["x' = u - y", equation], state="x y", inputs="u", domain={"x": (-1, 1), "y": (-0.8, 0.8)}, name="tank"
+    )
+
+
+def test_a_premise_in_an_algebraic_state_is_bounded_by_its_domain_unless_the_input_moves_it() -> None:
+    # Between samples the input is not that of the law: what was proved of the algebraic state with it is not so then.
+    still = release_system(RegionalRequest(with_algebraic("2*y + y^3 = x"), input_limits={"u": 2.0}))
+    assert still.sampling is not None
+    assert verify_system(still).verified
+    moved = RegionalRequest(with_algebraic("2*y + y^3 = x + u/20"), input_limits={"u": 2.0})
+    with pytest.raises(ClaimError, match="the algebraic state y, which moves with the input"):
+        release_system(moved)
+    assert release_system(moved, allow_unproved_rate=True).sampling is None
+
+
+def test_an_algebraic_equation_that_folds_is_refused() -> None:
+    # 0 = x - (y - 0.4 y^3) has no solution near y where x exceeds its largest value: the state would jump.
+    folding = with_algebraic("0 = x - (y - 0.8*y^3)")
+    with pytest.raises(InputError, match="the algebraic equation folds"):
+        release_system(RegionalRequest(folding, input_limits={"u": 5.0}), allow_unproved_rate=True)
+
+
 def test_more_decay_less_input_and_a_slower_loop_give_smaller_regions() -> None:
     base = replace(request_of("two-tanks"), rate_hz=None)
     size = [np.linalg.det(design_feedback(r).lyapunov) for r in (base, replace(base, decay_rate=0.3))]

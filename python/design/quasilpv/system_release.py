@@ -74,7 +74,8 @@ def release_system(
     verdict = verify_system(artifact)
     if not verdict.verified:
         raise ClaimError(f"{artifact.name}: not verified: {', '.join(verdict.failed[:3])}")
-    return _artifact(found.design, found.sampling, {"version": 1, "certificate": verdict.findings()})
+    evidence = {"version": 1, "certificate": verdict.findings(), "assumed": list(found.design.assumed)}
+    return _artifact(found.design, found.sampling, evidence)
 
 
 def _searched(request: RegionalRequest, allow_unproved_rate: bool, progress: Progress) -> _Sampled:

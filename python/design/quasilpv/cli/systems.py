@@ -81,6 +81,7 @@ def print_system(answer: Mapping[str, Any]) -> None:
         ("largest gain", f"{answer['largest_gain']:.4g}"),
         *((f"input {name}", text) for name, text in answer["inputs"].items()),
         *((f"assumed of {name}", text) for name, text in answer["parameters"].items()),
+        *(("assumed", text) for text in answer["verification"]["assumed"]),
         ("sampling period", f"{answer['sample_period_s']:.4g} s, {proved}"),
         ("certificate", f"{certificate['lmis']} inequalities hold: {evidence}"),
     ]

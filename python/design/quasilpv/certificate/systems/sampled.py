@@ -71,7 +71,7 @@ class SampledLoop:
 
     Raises:
         ArithmeticError: the equations cannot be solved for the rates on some cell, as far as the balls can tell, or an
-            algebraic state on which the premises depend has no domain.
+            algebraic state on which the premises depend has no domain or moves with the input.
     """
 
     def __init__(self, artifact: SystemArtifactDocument, cells: int = CELLS) -> None:
@@ -82,9 +82,8 @@ class SampledLoop:
         factor = np.linalg.cholesky(P)
         self._factor = factor
         self._reach = [math.sqrt(P[k, k]) * (1.0 + 1e-12) for k in range(self.q)]
-        right, inverse = _constant(factor), _constant(np.linalg.inv(factor))
-        # One step of Newton's method on the rounded inverse; what is left is in the balls of the product.
-        self._right, self._left = right, inverse * 2 - inverse * right * inverse
+        self._right = _constant(factor)
+        self._left = self._right.inv()
 
     @cached_property
     def bound(self) -> SampledBound:
@@ -154,8 +153,8 @@ class SampledLoop:
         return self._left * matrix * self._right
 
     def _balls(self, box: Box) -> list[arb]:
-        """Of all signals; algebraic states without a domain from the algebraic equations."""
-        is_open = [not (math.isfinite(low) and math.isfinite(high)) for low, high in box]
+        """Of all signals; algebraic states from their equations, or from their domain where premises depend on them."""
+        is_open = [self.q <= k < self.n and not self._by_domain for k in range(len(box))]
         cell = [arb(0) if wide else arb(low).union(arb(high)) for (low, high), wide in zip(box, is_open, strict=True)]
         if not any(is_open):
             return cell
@@ -168,22 +167,31 @@ class SampledLoop:
         return [solved[k - q, 0] if wide else ball for k, (ball, wide) in enumerate(zip(cell, is_open, strict=True))]
 
     def _used(self) -> list[int]:
-        """Signals other than inputs, with finite intervals, that premises and slopes depend on."""
+        """Signals that premises and slopes depend on, but for inputs and algebraic states that follow from others."""
         programs = [self.artifact.model.premises, *self.artifact.plant.jacobian]
         read = {step[1] for program in programs for step in program.code if step[0] == "signal"}
-        inputs = range(self.n, self.n + len(self.artifact.inputs))
+        followed = range(self.n if self._by_domain else self.q, self.n + len(self.artifact.inputs))
         intervals = self._intervals()
+        candidates = [k for k in sorted(read) if k < len(self.artifact.signals) and k not in followed]
+        return [k for k in candidates if intervals[k][0] < intervals[k][1] < math.inf]
+
+    @cached_property
+    def _by_domain(self) -> bool:
+        """Whether premises depend on algebraic states, which then are where their domain says.
+
+        Raises:
+            ArithmeticError: one has no domain, or moves with the input, which between samples is not that of the law.
+        """
         scheduled = {step[1] for step in self.artifact.model.premises.code if step[0] == "signal"}
-        for k in scheduled & set(range(self.q, self.n)):
-            if not math.isfinite(intervals[k][0] + intervals[k][1]):
-                name = self.artifact.signals[k].name
+        own = scheduled & set(range(self.q, self.n))
+        for k in own:
+            name = self.artifact.signals[k].name
+            if self.artifact.signals[k].low is None or self.artifact.signals[k].high is None:
                 raise ArithmeticError(f"the premises depend on the algebraic state {name}, which has no domain")
-        candidates = [k for k in sorted(read) if k < len(self.artifact.signals) and k not in inputs]
-        return [
-            k
-            for k in candidates
-            if math.isfinite(intervals[k][1] - intervals[k][0]) and intervals[k][0] < intervals[k][1]
-        ]
+            rows = [self.artifact.model.B.constant, *self.artifact.model.B.coefficients]
+            if any(any(map(any, matrix[self.q :])) for matrix in rows):
+                raise ArithmeticError(f"the premises depend on the algebraic state {name}, which moves with the input")
+        return bool(own)
 
     def _intervals(self) -> list[tuple[float, float]]:
         intervals = []

@@ -21,6 +21,7 @@ from quasilpv.conditions.regional.feedback import (
     require_inputs,
 )
 from quasilpv.conditions.regional.volume import geometric_mean_of_eigenvalues
+from quasilpv.conditions.reliance import COMPENSATION, Reliance, Status, refuse_refuted, reliances
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.lmi import Solution, Variable
 from quasilpv.polytopes import PolytopicModel, polytopic_model
@@ -66,6 +67,16 @@ class RegionalDesign:
     witness: dict[str, FloatArray]
 
     @property
+    def assumed(self) -> tuple[str, ...]:
+        """What the inequalities rely on and nothing proves, in words; that of the domain is what the region is for."""
+        relied = reliances(COMPENSATION, self.model)
+        return tuple(
+            f"{one.name}: {one.detail}"
+            for one in relied
+            if one.status is Status.ASSUMED and one.reliance is not Reliance.DOMAIN
+        )
+
+    @property
     def extent(self) -> FloatArray:
         """Largest magnitude of every differential state in the region, (q,)."""
         return np.asarray(np.sqrt(np.diag(self.lyapunov)))
@@ -75,7 +86,8 @@ def design_feedback(request: RegionalRequest, progress: Progress = no_progress) 
     """The best feedback and region.
 
     Raises:
-        InputError: nothing bounds the region in some direction, or a domain does not hold the trim.
+        InputError: nothing bounds the region in some direction, a domain does not hold the trim, or what the
+            inequalities rely on is refuted, for instance because an algebraic equation folds.
         InfeasibleError: no feedback was found, in any of the units tried.
     """
     if request.unbounded is not None:
@@ -83,6 +95,7 @@ def design_feedback(request: RegionalRequest, progress: Progress = no_progress) 
         raise InputError(request.system.name, f"domain of {request.unbounded}", "none", expected)
     widened = tuple(premise.widened() for premise in request.system.premises)
     model = polytopic_model(replace(request.system, premises=widened), REPRESENTATION)
+    refuse_refuted("regional feedback", COMPENSATION, model)
     found: list[RegionalDesign] = []
     for units in _units(request):
         search = _Search(request, model, units)
