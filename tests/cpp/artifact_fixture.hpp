@@ -298,7 +298,10 @@ inline Json law_table(const std::string& kind, const TestArm& arm) {
                 {"observer", {0.8, 250.0, 40000.0, 2.5e6}},
                 {"rotor_inertia_kg_m2", repeated(0.5)},
                 {"stiffness_nm_rad", repeated(2e4)},
-                {"correction_bandwidth_rad_s", 3.0}});
+                {"correction_bandwidth_rad_s", 3.0},
+                {"friction_viscous_nm_s", repeated(0.5)},
+                {"friction_coulomb_nm", repeated(1.0)},
+                {"dead_zone_rad", 2e-5}});
   } else {
     law.update({{"gp", repeated(1200.0)},
                 {"gd", repeated(60.0)},

@@ -38,6 +38,9 @@ LAW: dict[str, Any] = {
     "rotor_inertia_kg_m2": [0.4, 0.3, 0.2, 0.1],
     "stiffness_nm_rad": [2e4, 1e4, 8e3, 5e3],
     "correction_bandwidth_rad_s": 3.0,
+    "friction_viscous_nm_s": [1.0, 0.5, 0.0, 0.2],
+    "friction_coulomb_nm": [2.0, 0.0, 1.0, 0.5],
+    "dead_zone_rad": 5e-4,
 }
 
 
@@ -50,7 +53,8 @@ def test_when_the_law_steps_expect_the_recursion() -> None:
     tree = random_tree(rng, 4)
     controller = _runtime.Controller(runtime_of(tree_artifact(tree, LAW, torque_nm=1e7)))
     B, K = np.array(LAW["rotor_inertia_kg_m2"]), np.array(LAW["stiffness_nm_rad"])
-    share = 1.0 - math.exp(-3.0 * T)
+    viscous, coulomb = np.array(LAW["friction_viscous_nm_s"]), np.array(LAW["friction_coulomb_nm"])
+    share, left_alone = 1.0 - math.exp(-3.0 * T), 0
     start, ways = rng.uniform(-1.0, 1.0, 4), 0.3 * rng.normal(size=4)
     th, w, d, j, e_I, c1, c2 = start.copy(), *np.zeros((6, 4))
     gains = LAW["observer"]
@@ -64,15 +68,18 @@ def test_when_the_law_steps_expect_the_recursion() -> None:
         motor = r + fed / K + c2
         th, w, d, j = (x + gain * (y - th) for x, gain in zip((th, w, d, j), gains, strict=True))
         a = rdd + LAW["feedback"]["kp"] * (th - motor) + LAW["feedback"]["kd"] * (w - rd) + LAW["feedback"]["ki"] * e_I
-        torque = B * a + fed
+        friction = viscous * rd + coulomb * np.tanh(rd / 0.01)
+        torque = B * a + fed + friction
         scale = max(1.0, float(np.abs(torque).max()))
         np.testing.assert_allclose(report.torque_applied[:4], torque, rtol=0, atol=1e-11 * scale)
-        e_I = e_I + T * (y - motor)
-        c1 = c1 + share * ((torque - fed - B * rdd) / K - c1)
+        left_alone += int((np.abs(y - motor) <= LAW["dead_zone_rad"]).sum())
+        e_I = e_I + T * np.where(np.abs(y - motor) > LAW["dead_zone_rad"], y - motor, 0.0)
+        c1 = c1 + share * ((torque - fed - friction - B * rdd) / K - c1)
         c2 = c2 + share * (c1 - c2)
-        applied = a - rdd + rdd + d
+        applied = a + d
         th = th + T * w + T**2 / 2.0 * applied + T**3 / 6.0 * j
         w, d = w + T * applied + T**2 / 2.0 * j, d + T * j
+    assert 0 < left_alone < 200
 
 
 def test_when_the_inertia_is_a_table_or_a_gear_is_none_expect_it_refused() -> None:

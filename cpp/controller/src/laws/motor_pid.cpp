@@ -5,6 +5,8 @@
 namespace quasilpv {
 namespace {
 
+constexpr double kCoulombSpeed = 0.01;  // w_0, rad/s: friction is not fed forward at once where the reference turns
+
 /// Scalars of the sampled law, the same for every joint. Errors are x - x_r: stabilising kp, kd and ki are negative.
 struct MotorPidParameters final : ObserverParameters {
   struct Feedback {
@@ -20,6 +22,9 @@ struct MotorPidParameters final : ObserverParameters {
   JointArray rotor_inertia{};         ///< B, kg m^2, reflected to the joints
   JointArray stiffness{};             ///< K of the gears, N m/rad
   double correction_bandwidth = 0.0;  ///< of the reference's correction by the torque, rad/s; 0: none
+  JointArray viscous{};               ///< of the motors, N m s/rad, as far as it is known
+  JointArray coulomb{};               ///< likewise, N m
+  double dead_zone = 0.0;             ///< of the integral: errors up to this are not integrated, rad
 
   std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
 };
@@ -30,10 +35,10 @@ struct MotorPidParameters final : ObserverParameters {
 ///     tau_r  = ID(r, r', r'');   r_m = r + K^-1 tau_r + c_2,   r_m' = r',   r_m'' = r''  the reference of the motors
 ///     x_hat += [l1, l2, l3, l4] (y - th)                                                current estimator
 ///     a_cmd  = r'' + kp (th - r_m) + kd (w - r') + ki e_I
-///     Gamma  = B a_cmd + tau_r, limited
-///     e_I   += T (y - r_m)                                        anti-windup: see integrate_error()
-///     c_1   += (1 - p) (K^-1 (Gamma_applied - tau_r - B r'') - c_1);  c_2 += (1 - p) (c_1 - c_2),  p = exp(-w_c T)
-///     a_app  = B^-1 (Gamma_applied - tau_r) + a_d,  then as in DobAccelerationLaw
+///     Gamma  = B a_cmd + tau_r + f r' + c tanh(r' / w_0), limited                       f, c: friction of the motors
+///     e_I   += T (y - r_m) outside the dead zone                  anti-windup: see integrate_error()
+///     c_1   += (1 - p) (K^-1 (Gamma_applied - fed forward - B r'') - c_1);  c_2 += (1 - p) (c_1 - c_2),  p = exp(-w_c
+///     T) a_app  = B^-1 (Gamma_applied - fed forward) + a_d,  then as in DobAccelerationLaw
 ///
 /// What the torque is beside the one fed forward winds the spring further: slowly, through two lags, the reference of
 /// the motors follows, so that the link comes back.
@@ -48,6 +53,8 @@ class MotorPidLaw final : public ObserverLaw<N> {
         parameters_(parameters),
         rotor_(from_array<N>(parameters.rotor_inertia)),
         stiffness_(from_array<N>(parameters.stiffness)),
+        viscous_(from_array<N>(parameters.viscous)),
+        coulomb_(from_array<N>(parameters.coulomb)),
         correction_pole_(std::exp(-parameters.correction_bandwidth * settings.sample_period_s)) {}
 
  private:
@@ -63,6 +70,8 @@ class MotorPidLaw final : public ObserverLaw<N> {
                                              reference.acceleration.data(), fed_forward_.data());
     ReferenceVectors<N> motors = reference;
     motors.angle += fed_forward_.cwiseQuotient(stiffness_) + correction_;
+    fed_forward_ += viscous_.cwiseProduct(reference.speed) +
+                    coulomb_.cwiseProduct((reference.speed / kCoulombSpeed).array().tanh().matrix());
     return motors;
   }
 
@@ -74,12 +83,15 @@ class MotorPidLaw final : public ObserverLaw<N> {
     state.disturbance_rate += parameters_.observer[3] * innovation;
   }
 
-  Command<N> control(const ObserverState<N>& state, const ModelSample<N>& /*model*/,
-                     const ReferenceVectors<N>& reference, StepReport& /*report*/) noexcept override {
+  Command<N> control(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& reference,
+                     StepReport& /*report*/) noexcept override {
     const JointVector<N> acceleration =
         reference.acceleration + parameters_.feedback.kp * (state.angle - reference.angle) +
         parameters_.feedback.kd * (state.speed - reference.speed) + parameters_.feedback.ki * state.integral_error;
-    return {rotor_.cwiseProduct(acceleration) + fed_forward_, JointVector<N>::Constant(parameters_.feedback.ki)};
+    // A joint without a gain is not integrated: a motor that sticks is left alone where it is near enough.
+    const JointVector<N> gain = ((model.angle - reference.angle).array().abs() > parameters_.dead_zone)
+                                    .select(JointVector<N>::Constant(parameters_.feedback.ki), 0.0);
+    return {rotor_.cwiseProduct(acceleration) + fed_forward_, gain};
   }
 
   Motion predict(const ObserverState<N>& state, const ModelSample<N>& /*model*/, const ReferenceVectors<N>& reference,
@@ -95,8 +107,10 @@ class MotorPidLaw final : public ObserverLaw<N> {
   MotorPidParameters parameters_;
   JointVector<N> rotor_;
   JointVector<N> stiffness_;
+  JointVector<N> viscous_;
+  JointVector<N> coulomb_;
   double correction_pole_;
-  JointVector<N> fed_forward_ = JointVector<N>::Zero();  // tau_r of this sample
+  JointVector<N> fed_forward_ = JointVector<N>::Zero();  // tau_r and friction
   JointVector<N> lagging_ = JointVector<N>::Zero();      // c_1
   JointVector<N> correction_ = JointVector<N>::Zero();   // c_2
 };
@@ -132,6 +146,9 @@ LawKind motor_pid() {
   law.positive_joint_values("rotor_inertia_kg_m2", &P::rotor_inertia);
   law.positive_joint_values("stiffness_nm_rad", &P::stiffness);
   law.non_negative("correction_bandwidth_rad_s", &P::correction_bandwidth);
+  law.joint_values("friction_viscous_nm_s", &P::viscous);
+  law.joint_values("friction_coulomb_nm", &P::coulomb);
+  law.non_negative("dead_zone_rad", &P::dead_zone);
   law.finish(require_chain);
   return law.kind();
 }

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,8 @@ from quasilpv.systems.robots.spatial_robot import SpatialRobot
 from quasilpv.systems.robots.tree import KinematicTree
 
 POSTURES = 100
+DEAD_ZONE_COUNTS = 3
+"""Of the encoder: what the integral leaves alone where Coulomb friction is stated, since a motor that sticks hunts."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,9 @@ def _design(
         "rotor_inertia_kg_m2": law.rotors.tolist(),
         "stiffness_nm_rad": law.stiffness.tolist(),
         "correction_bandwidth_rad_s": law.correction_rad_s,
+        "friction_viscous_nm_s": [joint.friction_viscous_nm_s for joint in robot.joints],
+        "friction_coulomb_nm": [joint.friction_coulomb_nm for joint in robot.joints],
+        "dead_zone_rad": DEAD_ZONE_COUNTS * 2.0 * pi / 2.0**specification.encoder_bits if robot.rubs else 0.0,
         **design_inertia(links, 1.0),
     }
     gears = [
