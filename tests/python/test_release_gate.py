@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
@@ -217,3 +218,14 @@ def test_when_a_design_fails_its_gate_expect_it_neither_kept_nor_returned(tmp_pa
     assert not (tmp_path / "cache").exists()
     kept = designs.kept_design(DesignRequest.of("arm3", "dob-acceleration", Specification()), folder=tmp_path / "cache")
     assert evidence(kept)["gate"]["passed"] is True
+
+
+@pytest.mark.full
+def test_when_a_rate_is_too_low_expect_the_least_one_that_would_be_released(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["synth", "arm3", "--rate-hz", "50"]) == 1
+    found = re.search(r"--rate-hz (\d+) would be released\n$", capsys.readouterr().err)
+    assert found is not None
+    assert run(["synth", "arm3", "--rate-hz", found[1], "--json"]) == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,7 +22,7 @@ from quasilpv.cli.options import (
 )
 from quasilpv.cli.parameters import SetOption
 from quasilpv.cli.systems import names_a_system, numbers_by_name, print_system, write_system
-from quasilpv.errors import InputError
+from quasilpv.errors import ClaimError, InfeasibleError, InputError
 from quasilpv.files import claim_folder
 from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, DesignRequest, default_controller
 
@@ -183,7 +184,11 @@ def write_released(request: DesignRequest, out: Path, *, allow_unverified: bool 
 
     with progress(1) as steps:
         steps.begin(f"{request.controller} for {request.robot.id}")
-        made = release(request, motions_of=motions_of, allow_unverified=allow_unverified, progress=steps.parts)
+        try:
+            made = release(request, motions_of=motions_of, allow_unverified=allow_unverified, progress=steps.parts)
+        except (ClaimError, InfeasibleError) as error:
+            faster = _least_rate(request)
+            raise error if faster is None else type(error)(f"{error}; --rate-hz {faster:g} would be released") from None
         steps.end()
     paths = write_artifact(out, made.artifact)
     return {
@@ -193,6 +198,22 @@ def write_released(request: DesignRequest, out: Path, *, allow_unverified: bool 
         "report": dict(made.report),
         "verification": {name: found for name, found in (made.artifact.verification or {}).items() if name != "report"},
     }
+
+
+def _least_rate(request: DesignRequest) -> float | None:
+    """The least of 1, 2, 5, 10, ... Hz above what was asked for, up to the controller's own rate, that is released."""
+    from quasilpv.release import release
+    from quasilpv.scenarios import motions_of
+
+    asked, usual = request.specification.rate_hz, CONTROLLERS[request.controller].rate_hz
+    rates = [step * 10.0**power for power in range(1, 5) for step in (1.0, 2.0, 5.0)]
+    for rate in (rate for rate in rates if asked < rate <= usual):
+        try:
+            release(replace(request, specification=replace(request.specification, rate_hz=rate)), motions_of=motions_of)
+        except (ClaimError, InfeasibleError):
+            continue
+        return rate
+    return None
 
 
 def print_released(answer: dict[str, Any]) -> None:
