@@ -184,6 +184,12 @@ def test_the_simulator_has_no_mujoco_and_says_who_has() -> None:
         _runtime.Scenario.parse(canonical_json(document))
 
 
+def test_drives_that_lag_are_not_moved_by_mujoco() -> None:
+    document = scenario_of(any_robot("ur5").model, MujocoIntegrator(), np.zeros(6)).to_document()
+    with pytest.raises(InputError, match=r"integrator.kind: got mujoco, expected ida or rk4 with drives that lag"):
+        Scenario.from_document({**document, "plant": {**document["plant"], "lag_s": 1e-3}})
+
+
 @pytest.mark.parametrize(
     ("command", "line"),
     [
