@@ -4,6 +4,7 @@ from copy import deepcopy
 from dataclasses import replace
 from functools import cache
 from itertools import product
+from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
@@ -20,7 +21,10 @@ from quasilpv.certificate.gate.motion import satisfies_circle_criterion
 from quasilpv.certificate.gate.proof import RobustGate
 from quasilpv.certificate.gate.tree_motion import contraction_of
 from quasilpv.errors import InputError
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import write_run_files
 from quasilpv.release import checked_artifact
+from quasilpv.scenarios import TrackingExperiment
 from quasilpv.synthesis import DesignRequest, specification_for, synthesise
 from quasilpv.synthesis.acceleration import tree_law
 from quasilpv.synthesis.acceleration.search import Grid
@@ -28,6 +32,7 @@ from quasilpv.synthesis.rate_storages import RateStorages, find_rate
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
 from quasilpv.systems.robots.tree import KinematicTree
 from quasilpv.systems.robots.ur5 import ur5
+from quasilpv.trajectories import Trajectory
 from reference.gated_arms import multiple_pole_loop
 from reference.random_trees import random_tree
 from reference.tree_artifacts import small_robot
@@ -255,6 +260,30 @@ def test_when_limits_or_witness_are_malformed_expect_one_line_that_names_them(ch
 def test_when_drives_lag_expect_dob_moving_refused_by_name() -> None:
     with pytest.raises(InputError, match=r"lag: .*dob-moving"):
         synthesise(DesignRequest.of(replace(moving_robot(), lag_s=(0.0, 1e-3)), "dob-moving"))
+
+
+@pytest.mark.parametrize(
+    ("goal", "duration_s", "expected"),
+    [
+        ([0.0, 1.0, 0.0], 3.0, None),
+        (
+            [0.0, 1.0, 0.0],
+            0.5,
+            r"law\.motion_limits of joint 1: got .* rad/s at .* s of waypoints, expected at most 1.5",
+        ),
+        ([0.0, 0.0, 2.1], 6.0, r"law\.motion_limits of joint 2: got .* rad at .*, expected an angle in \[-2, 2\]"),
+    ],
+)
+def test_when_a_reference_leaves_the_motions_of_the_proof_expect_it_refused_with_place_and_time(
+    tmp_path: Path, goal: list[float], duration_s: float, expected: str | None
+) -> None:
+    trajectory = Trajectory.through([[0.0, 0.0, 0.0], goal], [0.0, duration_s])
+    setup = RunSetup(TrackingExperiment("waypoints", moving_robot(), trajectory), released())
+    if expected is None:
+        assert write_run_files(tmp_path, setup).artifact.is_file()
+        return
+    with pytest.raises(InputError, match=expected):
+        write_run_files(tmp_path, setup)
 
 
 @pytest.mark.full

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,7 @@ from quasilpv.trajectories import write_trajectory
 
 TRAJECTORY_NAME = "trajectory.json"
 SCENARIO_NAME = "scenario.json"
+TURN = 2.0 * pi
 
 
 def robot_of(artifact: Artifact) -> AnyRobot:
@@ -91,8 +93,8 @@ def write_run_files(folder: Path, setup: RunSetup) -> RunFiles:
     """Write artifact, trajectory and scenario of one run into ``folder``.
 
     Raises:
-        InputError: the controller is for another robot, the reference shorter than its sample, or the folder cannot be
-            written.
+        InputError: the controller is for another robot, the reference shorter than its sample or beyond the motions
+            the controller is proved for, or the folder cannot be written.
     """
     experiment, artifact = setup.experiment, setup.artifact
     if artifact.robot.id != experiment.robot.id:
@@ -105,6 +107,7 @@ def write_run_files(folder: Path, setup: RunSetup) -> RunFiles:
             f"at least one sample, {artifact.sample_period_s:g} s",
         )
         raise InputError(experiment.name, "duration_s", got, expected)
+    _require_motion_limits(artifact, experiment)
     scenario = build_scenario(
         experiment.robot,
         experiment.trajectory,
@@ -120,6 +123,24 @@ def write_run_files(folder: Path, setup: RunSetup) -> RunFiles:
         trajectory=write_trajectory(folder / TRAJECTORY_NAME, experiment.trajectory),
         scenario=write_scenario(folder / SCENARIO_NAME, scenario),
     )
+
+
+def _require_motion_limits(artifact: Artifact, experiment: TrackingExperiment) -> None:
+    """Raise InputError where a reference leaves what a law in motion is proved for, and the run time enforces."""
+    limits = getattr(artifact.law, "motion_limits", None)
+    if limits is None:
+        return
+    trajectory, T = experiment.trajectory, artifact.sample_period_s
+    for k in range(int(trajectory.duration_s / T) + 1):
+        at = trajectory.evaluate(k * T)
+        for j, ((low, high), fastest) in enumerate(zip(limits.angle_rad, limits.speed_rad_s, strict=True)):
+            where = f"law.motion_limits of joint {j}"
+            if abs(at.speed[j]) > fastest:
+                got = f"{abs(at.speed[j]):.3g} rad/s at {k * T:.3f} s of {experiment.name}"
+                raise InputError(artifact.name, where, got, f"at most {fastest:g} rad/s: a slower reference")
+            if not low <= at.angle[j] <= high and high - low < TURN:
+                got = f"{at.angle[j]:.4g} rad at {k * T:.3f} s of {experiment.name}"
+                raise InputError(artifact.name, where, got, f"an angle in [{low:g}, {high:g}]")
 
 
 def track(setup: RunSetup, folder: Path) -> TrackResult:
