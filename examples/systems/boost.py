@@ -6,7 +6,7 @@ i: current of the coil, A; v: output voltage, V; d: duty ratio, the input; V = 1
 v = 24 V and i = 2.4 A. The input multiplies both states, so B(z) depends on them. Source: Middlebrook and Cuk 1976.
 
     design synth examples/systems/boost.py:boost --input-limit d=0.4 -o out/boost
-    design simulate out/boost/artifact.json --start v=20
+    design simulate out/boost/artifact.json --start v=22
 """
 
 import quasilpv as ql

@@ -5,7 +5,7 @@
 h1, h2: levels, m; u: inflow, m^3/s; around the levels at which an inflow of 0.01 m^3/s stands still. Torricelli's law.
 
     design synth examples/systems/two_tanks.py:two_tanks --decay 0.05 --input-limit u=0.006 -o out/two_tanks
-    design simulate out/two_tanks/artifact.json --start h2=0.1
+    design simulate out/two_tanks/artifact.json --start h2=0.15
 """
 
 import quasilpv as ql
