@@ -18,7 +18,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from quasilpv.artifact import Artifact
-from quasilpv.documents.system_artifact import AffineDocument, SystemArtifactDocument
+from quasilpv.certificate.exact.vertex_tables import VertexTable
+from quasilpv.documents.system_artifact import SystemArtifactDocument
 from quasilpv.documents.tables import PolytopeTable
 from quasilpv.errors import InputError
 from quasilpv.files import write_atomically
@@ -100,32 +101,14 @@ def frozen(artifact: SystemArtifactDocument, premises: Mapping[str, float], *, c
             raise InputError("state_space", "premise", name, f"among {', '.join(model.names) or 'none'}")
     middle = [0.5 * (low + high) for low, high in zip(model.lower, model.upper, strict=True)]
     z = np.array([premises.get(name, value) for name, value in zip(model.names, middle, strict=True)])
-    E, A, B = (_at(matrix, z) for matrix in (model.E, model.A, model.B))
+    E, A, B = (matrix.evaluate(z) for matrix in (model.E, model.A, model.B))
     q = model.differential
     if closed:
         A = A.copy()
-        A[:, :q] += B @ _gain_at(artifact.law.gain, z)
+        A[:, :q] += B @ VertexTable.of(artifact.law.gain).evaluate(z[None])[0]
     onto = -np.linalg.solve(A[q:, q:], np.hstack([A[q:, :q], B[q:]])) if q < len(A) else np.zeros((0, q + B.shape[1]))
     reduced = np.linalg.solve(E[:q, :q], np.hstack([A[:q, :q], B[:q]]) + A[:q, q:] @ onto)
     return reduced[:, :q], reduced[:, q:]
-
-
-def _at(matrix: AffineDocument, z: Any) -> Any:
-    return np.array(matrix.constant) + sum(
-        (value * np.array(slope) for value, slope in zip(z, matrix.coefficients, strict=True)),
-        np.zeros(np.shape(matrix.constant)),
-    )
-
-
-def _gain_at(table: PolytopeTable, z: Any) -> Any:
-    total = np.zeros(np.shape(table.blocks[0].vertices[0]))
-    for block in table.blocks:
-        weights = np.ones(1)
-        for p in block.premises:
-            share = (z[p] - table.lower[p]) / (table.upper[p] - table.lower[p])
-            weights = np.outer(weights, [1.0 - share, share]).ravel()
-        total += np.tensordot(weights, np.array(block.vertices), axes=1) / len(table.blocks)
-    return total
 
 
 def _of_table(name: str, table: PolytopeTable) -> Arrays:

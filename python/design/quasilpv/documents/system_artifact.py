@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from quasilpv.arrays import FloatArray
 from quasilpv.documents.artifact import LONGEST_PERIOD_S, SHORTEST_PERIOD_S, Creator, Name, Sha256
 from quasilpv.documents.canonical import Document, document_hash, with_hash
 from quasilpv.documents.programs import MAX_SIGNALS, Program
@@ -62,6 +64,11 @@ class AffineDocument(StrictModel):
             *((f"coefficients[{i}]", m) for i, m in enumerate(self.coefficients)),
         ):
             require_shape(f"{field}.{name}", matrix, rows, columns)
+
+    def evaluate(self, z: FloatArray) -> FloatArray:
+        """X at premise vectors z, (p,) or (p, samples): (rows, columns) or (samples, rows, columns)."""
+        slopes = np.array(self.coefficients).reshape(len(z), *np.shape(self.constant))
+        return np.asarray(np.array(self.constant) + np.tensordot(z.T, slopes, axes=1))
 
 
 class ModelDocument(StrictModel):

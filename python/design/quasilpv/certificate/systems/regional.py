@@ -26,7 +26,6 @@ from typing import NamedTuple
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.claims import Claim
 from quasilpv.certificate.exact.double_sum import double_sum, he
 from quasilpv.certificate.exact.matrices import diagonal, matrix, rational, stack, symmetric, zero
@@ -330,17 +329,12 @@ def plant_claim(artifact: SystemArtifactDocument) -> Claim:
     rates = list(rng.normal(size=(n, POINTS)) * np.abs(np.array(signals[:n])).max(axis=1, keepdims=True))
     residual = np.array(program_values(artifact.plant.residual.code, signal=[*signals, *rates]))
     z = np.array(program_values(artifact.model.premises.code, signal=signals)).reshape(-1, POINTS)
-    E, A, B = (_evaluated(X, z) for X in (artifact.model.E, artifact.model.A, artifact.model.B))
+    E, A, B = (X.evaluate(z) for X in (artifact.model.E, artifact.model.A, artifact.model.B))
     x, u, x_dot = np.array(signals[:n]), np.array(signals[n : n + m]), np.array(rates)
     parts = [np.einsum("kij,jk->ik", X, v) for X, v in ((E, x_dot), (-A, x), (-B, u))]
     sizes = [np.einsum("kij,jk->ik", np.abs(X), np.abs(v)) for X, v in ((E, x_dot), (A, x), (B, u))]
     error = np.abs(residual - sum(parts)) / np.maximum(sum(sizes).max(axis=1, keepdims=True), 1e-300)
     return Claim.sampled(f"plant: residual of the model at {POINTS} points (sampled)", float(error.max()), ROUNDING)
-
-
-def _evaluated(affine: AffineDocument, z: FloatArray) -> FloatArray:
-    slopes = np.array(affine.coefficients).reshape(len(z), *np.shape(affine.constant))
-    return np.asarray(np.array(affine.constant) + np.einsum("pk,pij->kij", z, slopes))
 
 
 def _interval(signal: Signal, extent: float) -> tuple[float, float]:

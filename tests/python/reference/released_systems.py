@@ -1,0 +1,56 @@
+"""Released controllers of a few general systems, each made once, and starts and parameters for runs of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from quasilpv import _runtime
+from quasilpv.documents.canonical import canonical_json
+from quasilpv.documents.strict_model import validate
+from quasilpv.documents.system_artifact import SystemArtifactDocument
+from quasilpv.synthesis.regional.request import RegionalRequest
+from quasilpv.system_release import release_system
+from quasilpv.systems.catalogue import system_kind
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+ASKED: Mapping[str, tuple[str, dict[str, Any]]] = {
+    "two-tanks": ("systems/two_tanks.py:two_tanks", {"decay_rate": 0.05, "input_limits": {"u": 0.006}, "rate_hz": 5.0}),
+    "cart-pole": ("systems/cart_pole.py:cart_pole", {"decay_rate": 1.0, "input_limits": {"u": 60.0}}),
+    "dc-bus": ("own_system.py:dc_bus", {}),
+}
+
+
+@cache
+def request_of(name: str) -> RegionalRequest:
+    reference, asked = ASKED[name]
+    return RegionalRequest(system_kind(str(EXAMPLES / reference)).system(), **asked)
+
+
+@cache
+def released(name: str) -> SystemArtifactDocument:
+    return release_system(request_of(name))
+
+
+def loaded(artifact: SystemArtifactDocument) -> _runtime.SystemArtifact:
+    return _runtime.SystemArtifact.parse(canonical_json(artifact.to_document()))
+
+
+def changed(artifact: SystemArtifactDocument, **members: Any) -> SystemArtifactDocument:
+    return validate(SystemArtifactDocument, {**artifact.content(), **members}, "changed")
+
+
+def on_the_border(artifact: SystemArtifactDocument, rng: np.random.Generator, scale: float = 0.999) -> dict[str, float]:
+    """A start with V = scale^2, by name, with the trim."""
+    q = artifact.model.differential
+    direction = rng.normal(size=q)
+    x = scale * np.linalg.cholesky(np.array(artifact.region.lyapunov)) @ (direction / np.linalg.norm(direction))
+    return {s.name: float(v + s.trim) for s, v in zip(artifact.states[:q], x, strict=True)}
+
+
+def drawn_parameters(artifact: SystemArtifactDocument, rng: np.random.Generator) -> dict[str, float]:
+    return {s.name: float(rng.uniform(s.low, s.high)) for s in artifact.parameters}
