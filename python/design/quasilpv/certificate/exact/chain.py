@@ -24,7 +24,7 @@ what is proved is the statement about the numbers of the model as they are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import atan, comb, isfinite, pi
 
@@ -190,12 +190,17 @@ def prove_chain(joints: Sequence[ChainJoint], form: ChainForm, storages: Sequenc
     n = len(joints)
     if len(form.bodies) != n or len(form.rotors) != n or len(storages) != n - 1:
         raise ValueError("prove_chain: joints, bodies, rotors and storages do not belong together")
+    return prove_joints(_inequalities(k, joints, form, storages) for k in range(n))
+
+
+def prove_joints(inequalities: Iterable[Iterable[tuple[Polynomial, Chart]]]) -> ChainProof:
+    """Decide the inequalities of each joint in turn, base to tip, up to the first that is not proved."""
     cells = 0
-    for k in range(n):
-        for entry, chart in _inequalities(k, joints, form, storages):
+    for joint, charted in enumerate(inequalities, start=1):
+        for entry, chart in charted:
             outcome = positive_on(entry, chart.low, chart.high)
             if not isinstance(outcome, int):
-                return ChainProof(False, cells, k + 1, chart.coordinate(outcome))
+                return ChainProof(False, cells, joint, chart.coordinate(outcome))
             cells += outcome
     return ChainProof(True, cells)
 

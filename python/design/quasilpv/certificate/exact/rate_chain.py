@@ -36,7 +36,7 @@ from quasilpv.certificate.exact.chain import (
     Chart,
     Polynomial,
     block_diagonal,
-    positive_on,
+    prove_joints,
 )
 from quasilpv.certificate.exact.matrices import identity, is_positive_definite, is_symmetric, stack, zero
 
@@ -80,20 +80,14 @@ def prove_rate(joints: Sequence[ChainJoint], form: RateForm, storages: Sequence[
     n = len(joints)
     if not n == len(form.bodies) == len(form.rotors) == len(form.speeds) == len(storages) + 1:
         raise ValueError("prove_rate: joints, bodies, rotors, speeds and storages do not belong together")
-    cells = 0
-    for k in range(n):
-        if k < len(storages):
-            size = 1 if k == 0 else PAIR
-            if (storages[k].nrows(), storages[k].ncols()) != (size, size):
-                raise ValueError(f"prove_rate: storage {k} is not {size} x {size}")
-            if not is_symmetric(storages[k]) or (k > 0 and not is_positive_definite(_of_rates(storages[k]) * fmpq(-1))):
-                return ChainProof(False, cells, k + 1)
-        for entry, chart in _inequalities(k, joints, form, storages):
-            outcome = positive_on(entry, chart.low, chart.high)
-            if not isinstance(outcome, int):
-                return ChainProof(False, cells, k + 1, chart.coordinate(outcome))
-            cells += outcome
-    return ChainProof(True, cells)
+    for k, storage in enumerate(storages):
+        size = 1 if k == 0 else PAIR
+        if (storage.nrows(), storage.ncols()) != (size, size):
+            raise ValueError(f"prove_rate: storage {k} is not {size} x {size}")
+    for k, storage in enumerate(storages):
+        if not is_symmetric(storage) or (k > 0 and not is_positive_definite(_of_rates(storage) * fmpq(-1))):
+            return ChainProof(False, 0, k + 1)
+    return prove_joints(_inequalities(k, joints, form, storages) for k in range(n))
 
 
 def _inequalities(
