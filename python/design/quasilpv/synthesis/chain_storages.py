@@ -20,7 +20,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from quasilpv.arrays import FloatArray
-from quasilpv.synthesis.chain_blocks import coordinates_of, minimise, rounded, symmetric_basis, twist_scales
+from quasilpv.synthesis.chain_blocks import Block, coordinates_of, rounded, symmetric_basis, twist_scales
+from quasilpv.synthesis.storage_program import StorageProgram
 from quasilpv.systems.robots.tree import KinematicTree
 
 Side: TypeAlias = Literal["lowest", "highest"]
@@ -71,7 +72,7 @@ class Storages:
     rounds: int
 
 
-class ChainProgram:
+class ChainProgram(StorageProgram):
     """The inequalities of one side on a growing sample of coordinates.
 
     Args:
@@ -85,7 +86,7 @@ class ChainProgram:
         self._sign = 1.0 if side == "highest" else -1.0
         self._joints = pairing.tree.joints
         n = len(self._joints)
-        self._sizes = [1 if k == 0 else 6 for k in range(n - 1)]
+        super().__init__([1 if k == 0 else 6 for k in range(n - 1)])
         self._scales = twist_scales(self._joints, self.pairing.design)
         self._samples = [coordinates_of(joint.lower, joint.upper, ANGLES_PER_TURN) for joint in self._joints]
 
@@ -141,39 +142,14 @@ class ChainProgram:
         S = self._joints[k].twist
         return float(S @ np.diag(self._scales[k] ** -2) @ S + self.pairing.design_rotors[k])
 
-    @property
-    def unknowns(self) -> int:
-        """c and the storages."""
-        return 1 + sum(s * (s + 1) // 2 for s in self._sizes)
-
-    def _places(self, storage: int) -> slice:
-        counts = [s * (s + 1) // 2 for s in self._sizes]
-        start = 1 + sum(counts[:storage])
-        return slice(start, start + counts[storage])
-
     # ---- the programs ----------------------------------------------------------------------------------------------
 
-    def _stacked(self) -> list[tuple[FloatArray, FloatArray]]:
+    def _stacked(self) -> list[Block]:
         return [self.blocks(k, self._samples[k]) for k in range(len(self._joints))]
 
     def best_bound(self) -> float | None:
         """The best c on the samples; None if the solver has no answer."""
-        cost = np.zeros(self.unknowns)
-        cost[0] = self._sign
-        x = minimise(cost, [(F, G) for F, G in self._stacked()])
-        return None if x is None else float(x[0])
-
-    def widest(self, bound: float) -> tuple[FloatArray, float] | None:
-        """Storages with the largest common margin at a bound, and that margin; None if the solver has no answer."""
-        fixed = []
-        for F, G in self._stacked():
-            size = F.shape[-1]
-            margin = np.broadcast_to(-np.eye(size), (len(F), 1, size, size))
-            fixed.append((F + bound * G[:, 0], np.concatenate([margin, G[:, 1:]], axis=1)))
-        cost = np.zeros(self.unknowns)
-        cost[0] = -1.0
-        x = minimise(cost, fixed)
-        return None if x is None else (x[1:], float(x[0]))
+        return self.first_unknown(self._sign)
 
     def add_violators(self, bound: float, unknowns: FloatArray, margin: float) -> float:
         """Add the coordinates at which an inequality holds by less than half the margin, looked for densely.

@@ -17,11 +17,11 @@ from quasilpv.arrays import FloatArray
 from quasilpv.synthesis.chain_blocks import (
     Block,
     coordinates_of,
-    minimise,
     rounded,
     symmetric_basis,
     twist_scales,
 )
+from quasilpv.synthesis.storage_program import StorageProgram
 from quasilpv.systems.robots.tree import KinematicTree
 
 PAIR = 12
@@ -56,7 +56,7 @@ class RateStorages:
     rounds: int
 
 
-class RateProgram:
+class RateProgram(StorageProgram):
     """The inequalities on a growing sample of coordinates.
 
     Args:
@@ -72,7 +72,7 @@ class RateProgram:
         self._speeds = speeds / self.unit
         self._bodies = [joint.inertia.matrix for joint in tree.joints]
         self._rotors = tree.rotor_inertias
-        self._sizes = [1 if k == 0 else PAIR for k in range(n - 1)]
+        super().__init__([1 if k == 0 else PAIR for k in range(n - 1)])
         twists = twist_scales(tree.joints, self._bodies)
         self._scales = [np.concatenate([scale, scale]) for scale in twists]
         self._own = [self._own_inertia(k, twists[k]) ** -0.5 for k in range(n)]
@@ -84,16 +84,6 @@ class RateProgram:
     def _own_inertia(self, k: int, scale: FloatArray) -> float:
         S = self._joints[k].twist
         return float(S @ np.diag(scale**-2) @ S + self._rotors[k])
-
-    @property
-    def unknowns(self) -> int:
-        """beta and the storages."""
-        return 1 + sum(s * (s + 1) // 2 for s in self._sizes)
-
-    def _places(self, storage: int) -> slice:
-        counts = [s * (s + 1) // 2 for s in self._sizes]
-        start = 1 + sum(counts[:storage])
-        return slice(start, start + counts[storage])
 
     # ---- the inequalities ------------------------------------------------------------------------------------------
 
@@ -153,22 +143,7 @@ class RateProgram:
 
     def least_rate(self) -> float | None:
         """The least beta on the samples; None if the solver has no answer."""
-        cost = np.zeros(self.unknowns)
-        cost[0] = 1.0
-        x = minimise(cost, self._stacked())
-        return None if x is None else float(x[0])
-
-    def widest(self, rate: float) -> tuple[FloatArray, float] | None:
-        """Storages with the largest common margin at a rate, and that margin; None if the solver has no answer."""
-        fixed = []
-        for F, G in self._stacked():
-            size = F.shape[-1]
-            margin = np.broadcast_to(-np.eye(size), (len(F), 1, size, size))
-            fixed.append((F + rate * G[:, 0], np.concatenate([margin, G[:, 1:]], axis=1)))
-        cost = np.zeros(self.unknowns)
-        cost[0] = -1.0
-        x = minimise(cost, fixed)
-        return None if x is None else (x[1:], float(x[0]))
+        return self.first_unknown(1.0)
 
     def add_violators(self, rate: float, unknowns: FloatArray, margin: float) -> float:
         """Add the coordinates of a dense sample where an inequality holds by less than half the margin.
