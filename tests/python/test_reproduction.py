@@ -152,6 +152,18 @@ def test_when_the_code_has_changed_expect_stale_results_computed_again_and_dropp
     assert [kept["id"] for kept in json.loads((tmp_path / "results.json").read_text())] == ["fig-0.0"]
 
 
+def test_when_an_item_is_refused_expect_the_others_computed_and_one_line_that_names_it(tmp_path: Path) -> None:
+    def refuses(_: Effort) -> Finding:
+        raise InputError("design", "slew", "250", "at least 317")
+
+    refused = replace(an_item(refuses), id="fig-0.1")
+    after = replace(an_item(lambda _: finding(True)), id="fig-0.2")
+    with pytest.raises(InputError, match=r"1 refused: fig-0\.1: .*at least 317") as error:
+        reproduce([refused, after], Effort.QUICK, tmp_path)
+    assert "\n" not in str(error.value)
+    assert [row["id"] for row in json.loads((tmp_path / runner.RESULTS).read_text())] == ["fig-0.2"]
+
+
 def test_items_computed_in_several_runs_share_one_file(tmp_path: Path) -> None:
     for name in ("fig-0.0", "fig-0.1"):
         reproduce([replace(an_item(lambda _: finding(True)), id=name)], Effort.QUICK, tmp_path)

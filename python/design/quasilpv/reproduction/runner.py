@@ -44,20 +44,28 @@ def reproduce(
         One row per item, see `ItemResult.to_document`.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: the folder cannot be written; or items were refused, after all the others have been computed.
     """
+    refused: dict[str, InputError] = {}
     rows: list[Mapping[str, Any]] = []
     code = _code_digest()
+    stamp = {"effort": effort.value, "code": code, "formats": [*formats]}
     _write_results(out, rows, code)  # a folder that cannot be written is found before anything is computed
     for one in items:
         begin(one.id)
         row = _kept(out / f"{one.id}.json", effort, code, formats)
-        if row is None:
-            row = {**_computed(one, effort, out, formats), "effort": effort.value, "code": code, "formats": [*formats]}
+        try:
+            row = row or {**_computed(one, effort, out, formats), **stamp}
+        except InputError as error:
+            refused[one.id] = error  # the others do not depend on it
+        else:
             write_readable_json(out / f"{one.id}.json", row)
-        rows.append(row)
-        _write_results(out, rows, code)
+            rows.append(row)
+            _write_results(out, rows, code)
         end()
+    if refused:
+        reasons = "; ".join(f"{name}: {error}" for name, error in refused.items())
+        raise InputError(str(out / RESULTS), "items", f"{len(refused)} refused: {reasons}", "a result of every item")
     return rows
 
 
