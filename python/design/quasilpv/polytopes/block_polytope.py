@@ -229,15 +229,16 @@ class BlockPolytope:
 
     def exact_offsets(self, vertices: Sequence[int]) -> NDArray[Any]:
         """Rows of `exact_vertex_offsets`, for representations with too many vertices to want them all."""
-        low, high, centre = (
-            np.array([Fraction(bound) for bound in bounds.tolist()], dtype=object)
-            for bounds in (self.lower, self.upper, self.centre)
-        )
-        offsets = np.tile(centre, (len(vertices), 1))
-        for row, vertex in enumerate(vertices):
-            p = list(self._block(vertex).premises)
-            corner = low[p] + self._corner_table[vertex, p] * (high[p] - low[p])
-            offsets[row, p] += len(self.blocks) * (corner - centre[p])
+        offsets = np.empty((len(vertices), self.premises), dtype=object)
+        for p, (low, high, centre) in enumerate(zip(self.lower, self.upper, self.centre, strict=True)):
+            # A coordinate takes two or three values, however many vertices there are.
+            corners, number = np.unique(self._corner_table[list(vertices), p], return_inverse=True)
+            start, width, middle = Fraction(low), Fraction(high) - Fraction(low), Fraction(centre)
+            values = [
+                middle if corner == ELSEWHERE else middle + len(self.blocks) * (start + int(corner) * width - middle)
+                for corner in corners
+            ]
+            offsets[:, p] = np.array(values, dtype=object)[number.ravel()]
         return offsets
 
     @cached_property
