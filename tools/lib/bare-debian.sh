@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# bare-debian.sh SUITE FOLDER MIRROR: a bare Debian system in FOLDER/SUITE, in place of what was there, with a clone of
-# HEAD in /quasilpv. FOLDER/SUITE.tar keeps what debootstrap made, for the next time.
+# bare-debian.sh SUITE FOLDER MIRROR [NAME]: a bare Debian system in FOLDER/NAME (SUITE), in place of what was there, with
+# a clone of HEAD in /quasilpv. FOLDER/SUITE.tar keeps what debootstrap made, for the next time.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 source tools/lib/say.sh
 
 suite=$1 folder=$2 mirror=$3
-system=$folder/$suite
+system=$folder/${4:-$suite}
 
 remove_system() {
   # Nothing is mounted there but by hand: removing through such a mount would empty a folder of this machine.

@@ -29,6 +29,7 @@ from quasilpv.errors import (
     QuasilpvError,
     TransportError,
 )
+from quasilpv.extras import missing_extra
 from quasilpv.files import one_command
 
 EXIT_CODES: tuple[tuple[type[QuasilpvError], int], ...] = (
@@ -140,11 +141,11 @@ def _run(arguments: Sequence[str]) -> int:
         return _fail(str(error), code)
     except (KeyboardInterrupt, typer.Abort):
         return _fail("interrupted", EXIT_INTERRUPTED)
-    except ImportError:
-        unloadable = _unloadable_runtime()
-        if unloadable is None:
+    except ImportError as error:
+        reason = missing_extra(error) or _unloadable_runtime()
+        if reason is None:
             raise
-        return _fail(str(unloadable), 2)
+        return _fail(str(reason), 2)
 
 
 def main() -> None:

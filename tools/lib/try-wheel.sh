@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# try-wheel.sh DIST: installs the wheel for this Python from a folder, in a bare Debian, with pip alone, and uses it.
+# What apt installs is Python itself; no compiler, no library. mypy reads a script against the installed package.
+set -euo pipefail
+project=$(realpath "$(dirname "$0")/../..")
+dist=$1
+
+apt-get -q update
+DEBIAN_FRONTEND=noninteractive apt-get -q install --yes --no-install-recommends python3-venv
+for command in cc gcc g++ cmake; do
+  if command -v "$command"; then exit 1; fi
+done
+if ldconfig -p | grep -E 'libglib|liblcm|libsundials|libsodium|libpcre2-8'; then exit 1; fi
+
+wheel=$(ls "$dist"/quasilpv-*-cp"$(python3 -c 'import sys; print(*sys.version_info[:2], sep="")')"-*.whl)
+python3 -m venv /root/quasilpv
+PATH=/root/quasilpv/bin:$PATH
+cd /root
+pip install --progress-bar off "$wheel"
+python "$project/tools/lib/environment_size.py" "$project/docs/how-to/install.md"
+design --version
+for program in qlpv-controller qlpv-simulator; do "$program" --help >/dev/null; done
+design demo -o demo
+design view --log LAST 2>&1 | grep "pip install 'quasilpv\[view\]'"
+
+pip install --progress-bar off "${wheel}[hil,view]"
+design hil serial-square -o hil
+design log info LAST
+
+python3 -m venv /root/mypy
+/root/mypy/bin/pip install --progress-bar off mypy
+/root/mypy/bin/mypy --strict --python-executable /root/quasilpv/bin/python "$project/examples/typed.py"
+python "$project/examples/typed.py"
