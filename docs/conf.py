@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from sphinx.application import Sphinx
 
@@ -11,8 +12,8 @@ import quasilpv
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
-DOXYGEN_OUTPUT = ROOT / "build/docs/doxygen"
 
+sys.dont_write_bytecode = True  # of the extensions: nothing is written but into the folder that was asked for
 sys.path.append(str(DOCS / "_extensions"))
 
 project = "quasilpv"
@@ -26,11 +27,15 @@ extensions = [
     "sphinx.ext.napoleon",
     "command_help",
     "header_table",
+    "mathml",
 ]
 exclude_patterns = ["_*"]
 default_role = "code"
 
 myst_heading_anchors = 3
+myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = ["math"]  # as GitHub shows it
+html_math_renderer = "mathml"
 nb_execution_mode = "off"
 
 autodoc_member_order = "bysource"
@@ -47,10 +52,9 @@ html_copy_source = False
 html_show_sphinx = False
 html_static_path = ["_static"]
 html_css_files = ["quasilpv.css"]
-html_extra_path = [str(DOXYGEN_OUTPUT)]
 
 
-def run_doxygen() -> None:
+def run_doxygen(output: Path) -> None:
     """Write the C++ pages, which html_extra_path puts beside the others.
 
     Raises:
@@ -60,9 +64,8 @@ def run_doxygen() -> None:
     doxygen = shutil.which("doxygen")
     if doxygen is None:
         raise RuntimeError("doxygen is not installed: apt-get install doxygen")
-    shutil.rmtree(DOXYGEN_OUTPUT, ignore_errors=True)
-    DOXYGEN_OUTPUT.mkdir(parents=True)
-    subprocess.run([doxygen, str(DOCS / "_doxygen/Doxyfile")], cwd=ROOT, check=True)
+    settings = (DOCS / "_doxygen/Doxyfile").read_text(encoding="utf-8") + f'OUTPUT_DIRECTORY = "{output}"\n'
+    subprocess.run([doxygen, "-"], cwd=ROOT, input=settings, text=True, check=True)
 
 
 def is_noise(_app: object, _what: str, _name: str, member: object, _skip: bool, _options: object) -> bool | None:
@@ -72,7 +75,10 @@ def is_noise(_app: object, _what: str, _name: str, member: object, _skip: bool, 
 
 def setup(app: Sphinx) -> None:
     """Connect the above."""
-    run_doxygen()
+    folder = TemporaryDirectory(prefix="quasilpv-doxygen-")
+    run_doxygen(Path(folder.name))
+    app.config.html_extra_path = [folder.name]  # type: ignore[attr-defined]
+    app.connect("build-finished", lambda _app, _error: folder.cleanup())
     app.connect("autodoc-skip-member", is_noise)
 
 

@@ -21,6 +21,7 @@ if [[ ! -d $work/sundials/lib ]]; then
   say "building SUNDIALS: IDA, static, serial"
   sed 's/^deb /deb-src /' /etc/apt/sources.list >/etc/apt/sources.list.d/source.list
   apt-get -q update
+  apt-get -q install --yes --no-install-recommends xz-utils
   (cd "$work" && apt-get -q source --download-only sundials)
   mkdir -p "$work/sundials-source"
   tar --directory "$work/sundials-source" --strip-components 1 --extract --file "$work"/sundials_*.orig.tar.*
