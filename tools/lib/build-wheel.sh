@@ -19,7 +19,11 @@ tools/lib/packages.sh "$list"
 if [[ ! -d $work/sundials/lib ]]; then
   options=()
   say "building SUNDIALS: IDA, static, serial"
-  sed 's/^deb /deb-src /' /etc/apt/sources.list >/etc/apt/sources.list.d/source.list
+  if [[ -f /etc/apt/sources.list.d/debian.sources ]]; then
+    sed 's/^Types: deb$/Types: deb-src/' /etc/apt/sources.list.d/debian.sources >/etc/apt/sources.list.d/source.sources
+  else
+    sed 's/^deb /deb-src /' /etc/apt/sources.list >/etc/apt/sources.list.d/source.list
+  fi
   apt-get -q update
   apt-get -q install --yes --no-install-recommends xz-utils
   (cd "$work" && apt-get -q source --download-only sundials)

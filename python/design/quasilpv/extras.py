@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from quasilpv.errors import InputError
 
-_EXTRAS = {"cvxpy": "oracles", "lcm": "hil", "mcap": "hil", "viser": "view"}
+EXTRAS = {"cvxpy": "oracles", "lcm": "hil", "mcap": "hil", "viser": "view"}
 """Module and extra, of `pyproject.toml`. Those not named here are asked for where they are used."""
 
 
 def missing_extra(error: ImportError) -> InputError | None:
     """What to install after a failed import; None if no extra of the package would help."""
     module = (error.name or "").partition(".")[0]
-    if module not in _EXTRAS:
+    if module not in EXTRAS:
         return None
-    return InputError("installation", module, error.msg, f"it: pip install 'quasilpv[{_EXTRAS[module]}]'")
+    return InputError("installation", module, error.msg, f"it: pip install 'quasilpv[{EXTRAS[module]}]'")
