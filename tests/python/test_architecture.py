@@ -14,8 +14,8 @@ PACKAGE = ROOT / "python" / "design" / "quasilpv"
 
 # Every room of the package, lowest layer first. A room imports itself and the layers below its own.
 LAYERS = (
-    {"", "arrays", "defaults", "errors", "extras", "progress"},
-    {"files"},
+    {"", "arrays", "defaults", "errors", "progress"},
+    {"extras", "files"},
     {"documents"},
     {"systems"},
     {"polytopes"},

@@ -103,3 +103,16 @@ def test_the_time_limit_holds_for_all_of_them() -> None:
     answer = with_other_factorings(tora(), first, Limits(1.0), slow)
     assert time.monotonic() - start < 1.5
     assert answer.reason == first.reason
+
+
+def test_a_premise_of_a_state_and_a_parameter_has_no_one_value_at_rest() -> None:
+    """Weak gains: at x = 0 with g = 11 the closed loop x'' = 11 x - 5 x - 2 x' has the mode sqrt(7) - 1."""
+    loop = ql.DescriptorSystem.from_equations(
+        ["x' = w", "w' = g*sin(x) - 5*x - 2*w"],
+        state="x w",
+        inputs="",
+        domain={"x": (-1, 1), "g": (9, 11)},
+        unknown="g",
+    )
+    answer = ql.solve(loop, "I.1")
+    assert answer.headline == "infeasible, proved"

@@ -13,9 +13,9 @@ done
 if ldconfig -p | grep -E 'libglib|liblcm|libsundials|libsodium|libpcre2-8'; then exit 1; fi
 
 wheel=$(ls "$dist"/quasilpv-*-cp"$(python3 -c 'import sys; print(*sys.version_info[:2], sep="")')"-*.whl)
-python3 -m venv /root/quasilpv
-PATH=/root/quasilpv/bin:$PATH
-cd /root
+python3 -m venv "$HOME/quasilpv"
+PATH=$HOME/quasilpv/bin:$PATH
+cd "$HOME"
 pip install --progress-bar off "$wheel"
 python "$project/tools/lib/environment_size.py" "$project/docs/how-to/install.md"
 design --version
@@ -27,7 +27,7 @@ pip install --progress-bar off "${wheel}[hil,view]"
 design hil serial-square -o hil
 design log info LAST
 
-python3 -m venv /root/mypy
-/root/mypy/bin/pip install --progress-bar off mypy
-/root/mypy/bin/mypy --strict --python-executable /root/quasilpv/bin/python "$project/examples/typed.py"
+python3 -m venv "$HOME/mypy"
+"$HOME/mypy/bin/pip" install --progress-bar off mypy
+"$HOME/mypy/bin/mypy" --strict --python-executable "$HOME/quasilpv/bin/python" "$project/examples/typed.py"
 python "$project/examples/typed.py"

@@ -81,7 +81,8 @@ def _concerns_all(system: DescriptorSystem, refutation: Refutation | None) -> bo
         if premise.expression.free_symbols & set(system.state):
             value = sp.N(premise.expression.subs(at_rest))
             size = max(abs(premise.lower), abs(premise.upper))
-            if not (value.is_real and abs(float(value) - values[premise.name]) <= _SAME * size):
+            # With a parameter in it the value at rest is not one number.
+            if not (value.is_number and value.is_real and abs(float(value) - values[premise.name]) <= _SAME * size):
                 return False
     return True
 
