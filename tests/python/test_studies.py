@@ -1,9 +1,7 @@
-"""Questions, boundaries, maps and counts."""
+"""Questions, boundaries, maps and counts. As commands: `test_study_commands`."""
 
 import hashlib
 import json
-import subprocess
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +10,6 @@ import numpy as np
 import pytest
 
 import quasilpv as ql
-from quasilpv.cli import run
 from quasilpv.conditions.condition import Options
 from quasilpv.errors import InputError
 from quasilpv.lmi.common import common_problem
@@ -362,93 +359,6 @@ def without_times(region: Region) -> object:
     document = region.to_document()
     del document["seconds_per_point"]
     return document
-
-
-class TestCommands:
-    """The verbs, as a person calls them."""
-
-    @staticmethod
-    def design(*arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "quasilpv", *arguments], capture_output=True, text=True, check=False
-        )
-
-    def test_solve_prints_the_documented_members(self) -> None:
-        done = self.design("solve", "ex-I.1", "--condition", "II.6", "--set", "b=2.5", "--json")
-        answer = json.loads(done.stdout)
-        assert done.returncode == 0
-        sizes = {"certified", "margin", "unknowns", "rows", "seconds"}
-        assert set(answer) == {"verdict", "evidence", "reason", "relies_on", "refutation", "factoring"} | sizes
-        assert (answer["verdict"], answer["evidence"], answer["certified"]) == ("feasible", "proved", True)
-        assert answer["margin"] > 0
-
-    def test_infeasible_is_exit_code_1_and_a_negative_margin(self) -> None:
-        done = self.design("solve", "ex-I.1", "--condition", "II.6", "--set", "b=4", "--json")
-        answer = json.loads(done.stdout)
-        assert done.returncode == 1
-        assert (answer["verdict"], answer["certified"]) == ("infeasible", False)
-        assert answer["margin"] < 0
-
-    def test_region_writes_map_and_figure(self, tmp_path: Path) -> None:
-        axes = ("--x", "a=-2:6:3", "--y", "b=-4:8:3")
-        done = self.design("region", "ex-I.1", "-c", "II.6", *axes, "-j", "1", "-o", str(tmp_path), "--json")
-        document = json.loads(done.stdout)
-        assert {"points", "boundary", "seconds_per_point", "proved_share", "areas"} <= set(document)
-        assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png", ".jsonl"}
-        assert len(document["points"]) == 9
-
-    def test_maps_of_different_questions_lie_beside_each_other(self, tmp_path: Path) -> None:
-        axes = ("--x", "a=-2:6:2", "--y", "b=-4:8:2", "--grid", "-j", "1", "-o", str(tmp_path))
-        for options in ((), ("--representation", "ts"), ("--slack", "full")):
-            assert self.design("region", "ex-I.1", "-c", "II.6", *axes, *options).returncode == 0
-        assert len(list(tmp_path.glob("ex-I.1-II.6-*.json"))) == 3
-
-    def test_maps_of_one_question_over_other_ranges_share_answers_and_keep_their_files(
-        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-    ) -> None:
-        def mapped(x: str, *options: str) -> dict[Path, bytes]:
-            axes = ("--x", x, "--y", "b=-4:8:2", "-j", "1", "-o", str(tmp_path))
-            assert run(["region", "ex-I.1", "-c", "II.6", *axes, *options]) == 0
-            return {path: path.read_bytes() for path in tmp_path.iterdir() if path.suffix != ".jsonl"}
-
-        made = mapped("a=-2:6:3")
-        changes = (("a=-2:6:5",), ("a=-2:2:3",), ("a=-2:6:5", "--grid"), ("a=-2:6:5", "--adaptive"))
-        for number, change in enumerate(changes, start=2):
-            more = mapped(*change)
-            assert made.items() <= more.items()
-            assert len(more) == 2 * number  # JSON and PNG
-            made = more
-        assert mapped("a=-2:6:3").keys() == made.keys()
-        assert len(list(tmp_path.glob("*.jsonl"))) == 1
-        said = capsys.readouterr()
-        assert "answers known from" in said.err
-        assert [line.split(",")[0].split(":")[0] for line in said.out.splitlines()[::2]] == [
-            *["feasible"] * 3,
-            *["points only"] * 2,
-            "feasible",
-        ]
-
-    @pytest.mark.parametrize(
-        ("arguments", "words"),
-        [
-            (("solve", "ex-I.1", "-c", "II.6", "--set", "b"), "NAME=VALUE"),
-            (("solve", "ex-I.1", "-c", "II.6", "--decay", "-1"), "decay rate"),
-            (("solve", "ex-II.7", "-c", "II.6"), "regular system"),
-            (("solve", "ex-I.1", "-c", "II.6", "--representation", "tensor"), "one of ts"),
-            (("boundary", "ex-I.1", "-c", "II.6", "--over", "b=0"), "NAME=FROM:TO"),
-            (("boundary", "ex-I.1", "-c", "II.6", "--over", "b=0:1", "--tolerance", "2"), "tolerance"),
-            (("region", "ex-I.1", "-c", "II.6", "--x", "a=0:1:2.5", "--y", "b=0:1:2"), "whole number"),
-            (("region", "ex-I.1", "-c", "II.6", "--x", "a=0:1:2", "--y", "b=0:1:2", "-j", "0"), "--processes"),
-            (("complexity", "ex-I.9", "-c", "II.6"), "ex-I.1"),
-            (("solve", "arm3", "-c", "II.5", "--representation", "ts"), "cheaper: "),
-            (("solve", "ex-I.1", "-c", "II.8", "--window-s", "0"), "window"),
-        ],
-    )
-    def test_bad_input_is_one_line_and_exit_code_2(self, arguments: tuple[str, ...], words: str) -> None:
-        done = self.design(*arguments)
-        assert done.returncode == 2
-        assert done.stderr.count("\n") == 1
-        assert words in done.stderr
 
 
 def test_a_compiled_problem_of_a_question_is_decided_like_its_answer() -> None:
