@@ -219,7 +219,7 @@ def test_when_a_claim_knows_no_lag_expect_it_refused_by_name() -> None:
     document = arm3_document("dob-torque")
     document["payloads"]["lag_s"] = [0.0, 5e-4]
     for ask in (gate, verify):
-        with pytest.raises(InputError, match=r"payloads\.lag_s: .*\(dob-acceleration does\)"):
+        with pytest.raises(InputError, match=r"payloads\.lag_s: .*\(covered by dob-acceleration, motor-pid\)"):
             ask(document)
 
 

@@ -55,6 +55,7 @@ def gate(document: Given, source: str = "artifact", delay_samples: fmpq = HALF_A
     found = LAWS[own.law.kind].gate
     if found is None:
         raise _without(own, "gate", "one with this gate")
+    _require_witness(own)
     _require_lag_covered(own)
     return found(own, delay_samples)
 
@@ -74,6 +75,7 @@ def verify(document: Given, source: str = "artifact") -> Verification:
     checks = LAWS[own.law.kind].checks
     if not checks:
         raise _without(own, "checks", "one with a certificate")
+    _require_witness(own)
     _require_lag_covered(own)
     try:
         found = tuple(claim for check in checks for claim in check(own))
@@ -82,11 +84,19 @@ def verify(document: Given, source: str = "artifact") -> Verification:
     return Verification(found, time.perf_counter() - start)
 
 
+def _require_witness(own: Shipped[Any]) -> None:
+    if not LAWS[own.law.kind].claims_of(own.artifact):
+        expected = f"one: without it {own.law.kind} claims nothing, its loops were looked at on a grid (gridded)"
+        raise InputError(own.source, "witness", "none", expected)
+
+
 def _require_lag_covered(own: Shipped[Any]) -> None:
     kind = LAWS[own.law.kind]
     if not kind.covers_lag:
         known = ", ".join(law.name for law in LAWS.values() if law.covers_lag)
-        own.require_no_lag(f"no member of this name: of drives that lag, {kind.name} claims nothing ({known} does)")
+        own.require_no_lag(
+            f"no member of this name: of drives that lag, {kind.name} claims nothing (covered by {known})"
+        )
 
 
 def _without(own: Shipped[Any], part: str, expected: str) -> InputError:

@@ -14,10 +14,11 @@ from quasilpv.files import claim_folder
 
 if TYPE_CHECKING:
     from quasilpv.certificate import Gate
+    from quasilpv.certificate.gate.elastic import ElasticGate
     from quasilpv.certificate.gate.grid import GridGate
     from quasilpv.certificate.gate.proof import RobustGate
 
-MARGIN_FIGURE, GROWTH_FIGURE = "inertia-margin", "growth-rate"
+MARGIN_FIGURE, GROWTH_FIGURE, DISTANCE_FIGURE = "inertia-margin", "growth-rate", "distance"
 WHILE = "while no torque or slew limit acts"
 
 
@@ -33,8 +34,8 @@ def robust_command(
 ) -> int:
     """Ask whether the frozen loop is stable in every posture, with every payload, with up to half a sample of delay.
 
-    For dob-acceleration the answer is a proof; for torque-level laws it is a check on a grid, and says so. Exit code 1
-    if the gate is not passed. It reads nothing but the artifact.
+    For dob-acceleration and motor-pid the answer is a proof; for torque-level laws it is a check on a grid, and says
+    so. Exit code 1 if the gate is not passed. It reads nothing but the artifact.
 
     \b
     Example:
@@ -51,7 +52,7 @@ def robust_command(
     if json:
         print_json(found.timed_document() if isinstance(found, RobustGate) else found.to_document())
     else:
-        rows, verdict = (_rows(found), _verdict(found)) if isinstance(found, RobustGate) else _grid_answer(found)
+        rows, verdict = _answer(found)
         print_table(str(artifact), ("", ""), [*rows, ("evidence", found.evidence.value)], left_columns=2)
         print(verdict)
     if out is not None:
@@ -60,13 +61,50 @@ def robust_command(
     return 0 if found.passed else 1
 
 
+def _answer(found: Gate) -> tuple[list[tuple[str, str]], str]:
+    """Rows and verdict of any gate."""
+    from quasilpv.certificate.gate.elastic import ElasticGate
+    from quasilpv.certificate.gate.proof import RobustGate
+
+    if isinstance(found, ElasticGate):
+        return _elastic_answer(found)
+    return (_rows(found), _verdict(found)) if isinstance(found, RobustGate) else _grid_answer(found)
+
+
+def _elastic_answer(found: ElasticGate) -> tuple[list[tuple[str, str]], str]:
+    """Rows and verdict of the gate of elastic joints."""
+    from quasilpv.certificate.exact.rationals import to_float
+    from quasilpv.certificate.gate.elastic import WHAT
+
+    delay = f"{to_float(found.specified_delay_samples):g} samples of delay"
+    rows = [
+        ("links over rotors (proved)", _interval(*found.links.needed.to_floats()) if found.links.needed else "none")
+    ]
+    rows.append(("  found at samples", _interval(*found.links.sampled)))
+    plants, exclusion = found.plants, found.exclusion
+    if plants is not None and exclusion is not None:
+        period = found.loop.sample_period_s
+        low, high = (to_float(end) * period for end in plants.dampings)
+        rows += [
+            ("damping over stiffness", f"{_interval(1e3 * low, 1e3 * high)} ms"),
+            ("a member of the set", "stable" if exclusion.anchored else "not proved stable"),
+            ("cells of frequency, delay and lag", f"{exclusion.cells}"),
+        ]
+    if found.passed:
+        return rows, f"passed: {WHAT}: proved for every posture, load, gear and constant delay up to {delay}, {WHILE}"
+    return rows, f"NOT passed: {found.why_not_passed().removeprefix('robust gate: ')}"
+
+
 def _draw(found: Gate, out: Path, formats: Sequence[str]) -> list[Path]:
-    """The figure of either gate."""
+    """The figure of a gate."""
+    from quasilpv.certificate.gate.elastic import ElasticGate
     from quasilpv.certificate.gate.grid import GridGate
     from quasilpv.figures.gate import gate_figure
     from quasilpv.figures.style import save
 
     name = GROWTH_FIGURE if isinstance(found, GridGate) else MARGIN_FIGURE
+    if isinstance(found, ElasticGate):
+        name = DISTANCE_FIGURE
     return save(gate_figure(found), out / name, formats)
 
 

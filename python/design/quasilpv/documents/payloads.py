@@ -110,6 +110,26 @@ class Load(StrictModel):
     inertia_kg_m2: tuple[NonNegative, NonNegative, NonNegative]
 
 
+class Gear(StrictModel):
+    """A gear that gives.
+
+    Attributes:
+        stiffness_nm_rad: softest and stiffest.
+        damping_s: least and most damping over stiffness.
+    """
+
+    stiffness_nm_rad: Interval
+    damping_s: Interval
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for field, least in (("stiffness_nm_rad", "0 <"), ("damping_s", "0 <=")):
+            low, high = getattr(self, field)
+            if not low <= high or low < 0.0 or (low == 0.0 and least == "0 <"):
+                raise FieldError(field, [low, high], f"{least} lowest <= highest")
+        return self
+
+
 class TreePayloads(PayloadsDocument):
     """Robots in space around the nominal one, each difference on its own.
 
@@ -117,13 +137,17 @@ class TreePayloads(PayloadsDocument):
         link_tolerance: share by which the inertia of every link may differ, up and down.
         rotor_tolerance: the same of the rotors, one per joint.
         load: what the robot may carry; null for nothing.
+        gears: one per joint, of robots whose joints give; absent for rigid ones.
     """
 
     link_tolerance: Share
     rotor_tolerance: tuple[Share, ...]
     load: Load | None
+    gears: tuple[Gear, ...] | None = None
 
     def require_joints(self, joints: int) -> None:
         """See `PayloadsDocument.require_joints`."""
         if len(self.rotor_tolerance) != joints:
             raise FieldError("rotor_tolerance", f"{len(self.rotor_tolerance)} entries", str(joints))
+        if self.gears is not None and len(self.gears) != joints:
+            raise FieldError("gears", f"{len(self.gears)} entries", str(joints))

@@ -107,7 +107,7 @@ def shipped_design(request: DesignRequest) -> Artifact | None:
     if artifact.design_hash != document_hash(design_inputs(request.robot, inputs)):
         return None
     require_robot_of(artifact, request.robot)
-    if LAWS[artifact.law.kind].checks:
+    if LAWS[artifact.law.kind].claims_of(artifact):
         delay = fmpq(*request.specification.delay_samples.as_integer_ratio())
         if not (verify(artifact, artifact.name).verified and gate(artifact, artifact.name, delay).passed):
             raise ClaimError(f"{path}: the certificate or the robust gate of a shipped design does not hold")

@@ -6,8 +6,10 @@ from flint import fmpq
 from matplotlib.figure import Figure
 
 from quasilpv.certificate import Gate
+from quasilpv.certificate.gate.elastic import ElasticGate
 from quasilpv.certificate.gate.grid import GridGate, growth_curves
 from quasilpv.certificate.gate.proof import RobustGate, margin_curve
+from quasilpv.figures.distance import distance_figure
 from quasilpv.figures.growth import growth_figure
 from quasilpv.figures.margins import margin_figure
 
@@ -16,7 +18,9 @@ SHORTEST_CURVE_SAMPLES = fmpq(1)
 
 
 def gate_figure(found: Gate) -> Figure:
-    """What a gate found over the delay: growth rates on the grid, or the proved inertia margin."""
+    """What a gate found: growth rates or the inertia margin over the delay; distances over the frequency."""
+    if isinstance(found, ElasticGate):
+        return distance_figure(found)
     if isinstance(found, GridGate):
         return growth_figure(found, growth_curves(found))
     return margin_figure(found, margin_curve(found.loop, _longest_delay(found), lag_samples=found.lag[1]))

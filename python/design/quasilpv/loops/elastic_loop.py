@@ -60,7 +60,7 @@ class MotorLaw:
                 corrected[1] + T * applied + T**2 / 2.0 * corrected[3],
                 corrected[2] + T * corrected[3],
                 corrected[3],
-                integral + T * (angle - correction),
+                integral + T * (angle - correction) if ki != 0.0 else 0.0 * integral,  # a sum that nothing reads
                 lagging,
                 correction + share * (lagging - correction),
             ]
@@ -75,26 +75,40 @@ class ElasticPlant:
     Attributes:
         links: M, (n, n).
         rotors, stiffness, damping: B, K, D, (n,).
+        lag_s: time constant of the drives.
     """
 
     links: FloatArray
     rotors: FloatArray
     stiffness: FloatArray
     damping: FloatArray
+    lag_s: float = 0.0
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return (4 if self.lag_s == 0.0 else 5) * len(self.rotors)
 
     def held(self, time_s: float, assumed_rotors: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Transition of (q, th, w, v) over a time, and what a held command adds, (4 n, 4 n) and (4 n, n)."""
+        """Transition of (q, th, w, v) over a time, and what a held command adds, (4 n, 4 n) and (4 n, n).
+
+        Of drives that lag the commanded accelerations that have arrived are states too, (5 n, 5 n) and (5 n, n).
+        """
         n = len(self.rotors)
         pull, drag = np.diag(self.stiffness), np.diag(self.damping)
         from_springs = np.block([[-pull, pull, -drag, drag], [pull, -pull, drag, -drag]])
         inverse = np.linalg.inv(self.links)
         accelerations = np.vstack([inverse @ from_springs[:n], from_springs[n:] / self.rotors[:, None]])
-        extended = np.zeros((5 * n, 5 * n))
+        size = self.order
+        extended = np.zeros((size + n, size + n))
         extended[: 2 * n, 2 * n : 4 * n] = np.eye(2 * n)
         extended[2 * n : 4 * n, : 4 * n] = accelerations
-        extended[3 * n : 4 * n, 4 * n :] = np.diag(assumed_rotors / self.rotors)
+        extended[3 * n : 4 * n, 4 * n : 5 * n] = np.diag(assumed_rotors / self.rotors)
+        if self.lag_s > 0.0:
+            extended[4 * n : 5 * n, 4 * n : 5 * n] = -np.eye(n) / self.lag_s
+            extended[4 * n : 5 * n, 5 * n :] = np.eye(n) / self.lag_s
         flow = expm(extended * time_s)
-        return flow[: 4 * n, : 4 * n], flow[: 4 * n, 4 * n :]
+        return flow[:size, :size], flow[:size, size:]
 
 
 def growth_rate(law: MotorLaw, plant: ElasticPlant, delay_s: float) -> float:
@@ -111,19 +125,20 @@ def growth_rate(law: MotorLaw, plant: ElasticPlant, delay_s: float) -> float:
     before, by_old = plant.held(late, law.rotors)
     after, by_new = plant.held(T - late, law.rotors)
     A, b, c, d = zip(*(law.state_space(joint) for joint in range(n)), strict=True)
-    angle = np.zeros((n, 4 * n))
+    own = plant.order
+    angle = np.zeros((n, own))
     angle[:, n : 2 * n] = np.eye(n)
-    states, old = (4 + STATES) * n, n * (whole + 1)
-    size = states + old
+    states = own + STATES * n
+    size = states + n * (whole + 1)
     command = np.zeros((n, size))
-    command[:, : 4 * n] = np.diag(d) @ angle
-    command[:, 4 * n : states] = block_diag(*(row[None] for row in c))
+    command[:, :own] = np.diag(d) @ angle
+    command[:, own:states] = block_diag(*(row[None] for row in c))
     on_its_way = [command, *np.eye(size)[states:].reshape(whole + 1, n, size)]
     following = np.zeros((size, size))
-    following[: 4 * n, : 4 * n] = after @ before
-    following[: 4 * n] += by_new @ on_its_way[whole] + after @ by_old @ on_its_way[whole + 1]
-    following[4 * n : states, : 4 * n] = block_diag(*(column[:, None] for column in b)) @ angle
-    following[4 * n : states, 4 * n : states] = block_diag(*A)
+    following[:own, :own] = after @ before
+    following[:own] += by_new @ on_its_way[whole] + after @ by_old @ on_its_way[whole + 1]
+    following[own:states, :own] = block_diag(*(column[:, None] for column in b)) @ angle
+    following[own:states, own:states] = block_diag(*A)
     for i in range(whole + 1):
         following[states + i * n : states + (i + 1) * n] = on_its_way[i]
     return float(np.log(np.abs(np.linalg.eigvals(following)).max()) / T)

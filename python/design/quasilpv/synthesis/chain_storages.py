@@ -87,7 +87,9 @@ class ChainProgram(StorageProgram):
         self._joints = pairing.tree.joints
         n = len(self._joints)
         super().__init__([1 if k == 0 else 6 for k in range(n - 1)])
-        self._scales = twist_scales(self._joints, self.pairing.design)
+        # A design inertia of rotors alone has no bodies to scale twists by.
+        self._bodies = pairing.design if pairing.design.any() else np.array([body[0] for body in pairing.true])
+        self._scales = twist_scales(self._joints, self._bodies)
         self._samples = [coordinates_of(joint.lower, joint.upper, ANGLES_PER_TURN) for joint in self._joints]
 
     # ---- the inequalities ------------------------------------------------------------------------------------------
@@ -136,7 +138,7 @@ class ChainProgram(StorageProgram):
 
     def _first_inertia(self) -> float:
         S = self._joints[0].twist
-        return float(S @ self.pairing.design[0] @ S + self.pairing.design_rotors[0]) or 1.0
+        return float(S @ self._bodies[0] @ S + self.pairing.design_rotors[0]) or 1.0
 
     def _own_inertia(self, k: int) -> float:
         S = self._joints[k].twist

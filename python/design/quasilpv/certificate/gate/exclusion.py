@@ -38,15 +38,15 @@ class Cell:
         W ~ zeta^-5 turns five times as fast as zeta in frequency, and by phi in delay and lag.
         """
         low, high = self.phase
-        if 4 * (high - low) > high * high * max(_width(self.delay), _width(self.lag)):
-            return Cell((low, _middle(self.phase)), self.delay, self.lag), Cell(
-                (_middle(self.phase), high), self.delay, self.lag
+        if 4 * (high - low) > high * high * max(width(self.delay), width(self.lag)):
+            return Cell((low, middle(self.phase)), self.delay, self.lag), Cell(
+                (middle(self.phase), high), self.delay, self.lag
             )
-        if _width(self.delay) >= _width(self.lag):
-            (first, last), middle = self.delay, _middle(self.delay)
-            return Cell(self.phase, (first, middle), self.lag), Cell(self.phase, (middle, last), self.lag)
-        (first, last), middle = self.lag, _middle(self.lag)
-        return Cell(self.phase, self.delay, (first, middle)), Cell(self.phase, self.delay, (middle, last))
+        if width(self.delay) >= width(self.lag):
+            (first, last), cut = self.delay, middle(self.delay)
+            return Cell(self.phase, (first, cut), self.lag), Cell(self.phase, (cut, last), self.lag)
+        (first, last), cut = self.lag, middle(self.lag)
+        return Cell(self.phase, self.delay, (first, cut)), Cell(self.phase, self.delay, (cut, last))
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class StabilityBox:
             budget: cells after which it stays unknown.
         """
         with ctx.workprec(BITS):
-            for whole, part in _by_whole_samples(delay):
+            for whole, part in by_whole_samples(delay):
                 budget = self._exclude(whole, part, budget)
             return budget > 0
 
@@ -98,11 +98,11 @@ class StabilityBox:
 
     def _is_excluded(self, whole: int, cell: Cell) -> bool:
         """Whether W misses [lowest, highest] on a cell."""
-        middle, radius = _middle(cell.phase), _width(cell.phase) / 2
-        zeta = acb(arb(middle).cos() - 1, arb(middle).sin())
+        centre, radius = middle(cell.phase), width(cell.phase) / 2
+        zeta = acb(arb(centre).cos() - 1, arb(centre).sin())
         box = zeta + acb(arb(0, arb(radius)), arb(0, arb(radius)))
-        numerator = _centred(self.numerator, zeta, radius) * _plant(box, cell.delay, cell.lag)
-        denominator = _centred(self.denominator, zeta, radius) * acb(0, arb(middle, radius) * whole).exp()
+        numerator = centred(self.numerator, zeta, radius) * sampled_plant(box, cell.delay, cell.lag)
+        denominator = centred(self.denominator, zeta, radius) * acb(0, arb(centre, radius) * whole).exp()
         small, large = denominator.abs_lower(), denominator.abs_upper()
         if numerator.abs_lower() > self.highest * large or numerator.abs_upper() < self.lowest * small:
             return True
@@ -112,9 +112,9 @@ class StabilityBox:
         return bool(product.real < self.lowest * small**2 or product.real > self.highest * large**2)
 
 
-def _plant(zeta: acb, delay: Interval, lag: Interval) -> acb:
+def sampled_plant(zeta: acb, delay: Interval, lag: Interval) -> acb:
     """N (see `quasilpv.certificate.gate.loop`) on a box of zeta, of delays (less whole samples) and of lags."""
-    early, s = 1 - _ball(delay), _ball(lag)
+    early, s = 1 - interval_ball(delay), interval_ball(lag)
     u = early - s
     plant = 1 + (u + fmpq(1, 2)) * zeta + (u**2 + s**2) / 2 * zeta**2
     if lag[1] == 0:
@@ -129,23 +129,26 @@ def _exponential(time: fmpq, lag: fmpq) -> arb:
     return arb(0) if lag == 0 else (arb(-time / lag)).exp()
 
 
-def _by_whole_samples(delay: Interval) -> Iterator[tuple[int, Interval]]:
+def by_whole_samples(delay: Interval) -> Iterator[tuple[int, Interval]]:
     """Whole samples w, and the delays beyond them, of an interval of delays."""
     first, last = delay
     for whole in range(int(first.floor()), int(last.floor()) + 1):
         yield whole, (max(first - whole, fmpq(0)), min(last - whole, fmpq(1)))
 
 
-def _middle(interval: Interval) -> fmpq:
+def middle(interval: Interval) -> fmpq:
+    """Of an interval."""
     return (interval[0] + interval[1]) / 2
 
 
-def _width(interval: Interval) -> fmpq:
+def width(interval: Interval) -> fmpq:
+    """Of an interval."""
     return interval[1] - interval[0]
 
 
-def _ball(interval: Interval) -> arb:
-    return arb(_middle(interval), _width(interval) / 2)
+def interval_ball(interval: Interval) -> arb:
+    """The ball of an interval."""
+    return arb(middle(interval), width(interval) / 2)
 
 
 def _hull(first: fmpq_poly, second: fmpq_poly) -> acb_poly:
@@ -155,7 +158,7 @@ def _hull(first: fmpq_poly, second: fmpq_poly) -> acb_poly:
         return acb_poly([acb(arb(first[k]).union(arb(second[k]))) for k in range(degree + 1)])
 
 
-def _centred(polynomial: acb_poly, centre: acb, radius: fmpq) -> acb:
+def centred(polynomial: acb_poly, centre: acb, radius: fmpq) -> acb:
     """Enclosure on the disk ``|zeta - centre| <= radius`` from the Taylor coefficients there.
 
     As ``|e^(i phi) - e^(i middle)| <= |phi - middle|``, a disk with the radius of a cell holds its arc of the circle.

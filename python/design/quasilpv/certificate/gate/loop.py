@@ -90,15 +90,19 @@ class AccelerationLoopData:
         Any library that errs by less than one unit in the last place returns one of these two numbers, and what is
         proved is proved for both.
         """
-        exponent = -self.sample_period_s / self.filter_time_constant_s
-        with ctx.workprec(FORGETTING_BITS):
-            pole = arb(exponent).exp()
-            below = math.exp(exponent)
-            while not arb(below) < pole:
-                below = math.nextafter(below, -math.inf)
-            while arb(math.nextafter(below, math.inf)) < pole:
-                below = math.nextafter(below, math.inf)
-        return rational(below), rational(math.nextafter(below, math.inf))
+        return exponential_poles(-self.sample_period_s / self.filter_time_constant_s)
+
+
+def exponential_poles(exponent: float) -> tuple[fmpq, fmpq]:
+    """The two doubles on either side of the exponential of a double, as rationals."""
+    with ctx.workprec(FORGETTING_BITS):
+        pole = arb(exponent).exp()
+        below = math.exp(exponent)
+        while not arb(below) < pole:
+            below = math.nextafter(below, -math.inf)
+        while arb(math.nextafter(below, math.inf)) < pole:
+            below = math.nextafter(below, math.inf)
+    return rational(below), rational(math.nextafter(below, math.inf))
 
 
 @dataclass(frozen=True)

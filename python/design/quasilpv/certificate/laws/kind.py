@@ -9,12 +9,14 @@ from typing import Any, Protocol, TypeAlias
 from flint import fmpq
 
 from quasilpv.certificate.exact.claims import Claim, Evidence
+from quasilpv.certificate.gate.elastic import ElasticGate
 from quasilpv.certificate.gate.grid import GridGate
 from quasilpv.certificate.gate.proof import RobustGate
 from quasilpv.certificate.reading import Shipped
+from quasilpv.documents.artifact import ArtifactDocument
 from quasilpv.documents.law import LawDocument
 
-Gate: TypeAlias = RobustGate | GridGate
+Gate: TypeAlias = RobustGate | GridGate | ElasticGate
 
 
 class GateFunction(Protocol):
@@ -34,6 +36,7 @@ class LawKind:
         gate: its robust gate: a proof where the loop decouples, a grid elsewhere; None for a law without.
         gate_evidence: what the gate of a released artifact has to rest on; a grid is called one.
         covers_lag: whether claims and gate hold for drives that lag, or are about others.
+        claims_by_witness: an artifact without a witness claims nothing: what was looked at on a grid is no claim.
     """
 
     document: type[LawDocument]
@@ -41,6 +44,11 @@ class LawKind:
     gate: GateFunction | None = None
     gate_evidence: Evidence = Evidence.SAMPLED
     covers_lag: bool = False
+    claims_by_witness: bool = False
+
+    def claims_of(self, artifact: ArtifactDocument[Any]) -> bool:
+        """Whether an artifact of this kind claims anything."""
+        return bool(self.checks) and not (self.claims_by_witness and artifact.witness is None)
 
     @property
     def name(self) -> str:

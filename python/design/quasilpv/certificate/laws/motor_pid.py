@@ -1,14 +1,26 @@
 """The law `motor-pid`: PID of the motors of elastic joints, the inverse dynamics of the links fed forward.
 
-It claims nothing: its design is looked at on a grid of postures, loads and stiffnesses (`quasilpv.synthesis.elastic`).
+An artifact with a witness claims the stability of its frozen loop, correction included, for every arm it states and
+every delay up to that of the witness: the chain certificate of the links, exact, and the exclusion of
+`quasilpv.certificate.gate.two_mass`, in ball arithmetic. One without a witness claims nothing: its design was looked at
+on a grid of postures, loads and stiffnesses (`quasilpv.synthesis.elastic`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
+from flint import fmpq
+
+from quasilpv.certificate.exact.claims import Claim, Evidence
+from quasilpv.certificate.exact.matrices import rational
+from quasilpv.certificate.exact.rationals import to_float
+from quasilpv.certificate.gate.elastic import WHAT, ElasticGate, elastic_gate
+from quasilpv.certificate.gate.motor_loop import MotorLoopData
 from quasilpv.certificate.laws.dob_acceleration import Feedback
 from quasilpv.certificate.laws.kind import LawKind
+from quasilpv.certificate.reading import Shipped, WitnessDocument
 from quasilpv.documents.design_inertia import DesignInertia
 from quasilpv.documents.law import ChainLaw
 from quasilpv.documents.mechanism import Tree
@@ -49,4 +61,49 @@ class MotorPidLaw(ChainLaw):
                 raise FieldError(f"law.{name}", f"{len(getattr(self, name))} entries", f"{joints}, one per joint")
 
 
-LAW = LawKind(MotorPidLaw)
+class ExclusionWitness(WitnessDocument):
+    """Up to which delay roots on the unit circle are excluded."""
+
+    longest_delay_samples: float
+
+
+class MotorPidWitness(WitnessDocument):
+    """What the claims need beside the law and the storages of the links."""
+
+    exclusion: ExclusionWitness
+
+
+def claims(shipped: Shipped[MotorPidLaw]) -> Iterator[Claim]:
+    """What a `motor-pid` artifact with a witness claims.
+
+    Raises:
+        InputError, ValueError: the witness is not of the documented form.
+    """
+    longest = rational(shipped.witness(MotorPidWitness).exclusion.longest_delay_samples)
+    found = gate(shipped, longest)
+    low, high = found.links.sides
+    least, most = found.links.sampled
+    lowest, highest = to_float(low.bound), to_float(high.bound)
+    yield Claim("links: at least m1 rotors", low.proof.holds and lowest > 0.0, 1.0 - lowest / least, Evidence.EXACT)
+    yield Claim("links: at most m2 rotors", high.proof.holds, 1.0 - most / highest, Evidence.EXACT)
+    yield Claim.enclosed(WHAT, found.passed, -1.0 if found.exclusion is None else found.exclusion.spare)
+
+
+def gate(shipped: Shipped[MotorPidLaw], delay_samples: fmpq) -> ElasticGate:
+    """The exclusion for all that `quasilpv.certificate.gate.elastic` says."""
+    return elastic_gate(shipped, loop_data(shipped.law, shipped.artifact.sample_period_s), delay_samples)
+
+
+def loop_data(law: MotorPidLaw, sample_period_s: float) -> MotorLoopData:
+    """The numbers that decide the frozen loop."""
+    return MotorLoopData(
+        sample_period_s=sample_period_s,
+        feedback=(law.feedback.kp, law.feedback.kd, law.feedback.ki),
+        observer=law.observer,
+        correction_rad_s=law.correction_bandwidth_rad_s,
+        rotors=tuple(law.rotor_inertia_kg_m2),
+        stiffness=tuple(law.stiffness_nm_rad),
+    )
+
+
+LAW = LawKind(MotorPidLaw, (claims,), gate, Evidence.ENCLOSED, covers_lag=True, claims_by_witness=True)

@@ -15,6 +15,9 @@ from typing import Literal, TypeAlias
 Interval = tuple[float, float]
 EncoderSide: TypeAlias = Literal["motor", "link", "both"]
 
+DAMPING_REACH = 10.0
+"""Most over least damping of a gear."""
+
 
 class ArmClass(StrEnum):
     """What laws can be for an arm."""
@@ -43,6 +46,11 @@ class ElasticDrive:
     encoder_side: EncoderSide
     torque_sensor: bool
     torque_loop: bool
+
+    @property
+    def damping_s(self) -> Interval:
+        """Least and most damping over stiffness that a design is for: people state the least."""
+        return self.damping_least_s, DAMPING_REACH * self.damping_least_s
 
     @property
     def arm_class(self) -> ArmClass:

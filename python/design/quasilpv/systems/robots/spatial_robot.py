@@ -103,6 +103,7 @@ class SpatialPlants:
         load: what the tool may carry; None for nothing.
         tool: placement of the load's frame in that of the last joint.
         lag_s: shortest and longest time constant of the drives, common to all joints.
+        gears: of joints that give, one each; none for an arm with a rigid joint.
     """
 
     link_tolerance: float
@@ -110,6 +111,7 @@ class SpatialPlants:
     load: PayloadBody | None
     tool: Placement
     lag_s: Interval = (0.0, 0.0)
+    gears: tuple[ElasticDrive, ...] = ()
 
     def to_document(self) -> dict[str, Any]:
         """The ``payloads`` member of an artifact."""
@@ -127,7 +129,12 @@ class SpatialPlants:
                 "inertia_kg_m2": list(load.inertia_kg_m2),
             },
             **({"lag_s": list(self.lag_s)} if self.lag_s[1] > 0.0 else {}),
+            **({"gears": [_gear(drive) for drive in self.gears]} if self.gears else {}),
         }
+
+
+def _gear(drive: ElasticDrive) -> dict[str, Any]:
+    return {"stiffness_nm_rad": list(drive.stiffness_nm_rad), "damping_s": list(drive.damping_s)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +201,9 @@ class SpatialRobot:
     def payloads(self) -> SpatialPlants:
         """The robots a design must cover."""
         rotors = tuple(joint.rotor_tolerance for joint in self.joints)
-        return SpatialPlants(self.link_uncertainty, rotors, self.payload, self.tree.tool, self.lag_s)
+        gears = tuple(joint.drive for joint in self.joints if joint.drive is not None)
+        elastic = gears if len(gears) == len(self.joints) else ()
+        return SpatialPlants(self.link_uncertainty, rotors, self.payload, self.tree.tool, self.lag_s, elastic)
 
     def with_payload_fraction(self, fraction: float) -> TreeMechanism:
         """The nominal robot with a share of its load in [0, 1], far out: see `PayloadBody.farthest`.
