@@ -41,10 +41,15 @@ class DriveRobot final : public quasilpv::Robot {
     waiting_ = false;
     reading.seq = seq_ = (pacer_.tick_ns() - start_ns_) / period_ns_;
     reading.taken_ns = quasilpv::monotonic_ns();
+    // What the gears have besides; a robot with one encoder per joint leaves this out.
+    reading.gears.available = quasilpv::kMotorAngle | quasilpv::kLinkAngle | quasilpv::kJointTorque;
     for (std::size_t j = 0; j < drives_.size(); ++j) {
       std::int32_t counts = 0;
       reading.angle_rad[j] = drives_[j].read_counts(counts) ? counts / BenchDrive::kCountsPerRad
                                                             : std::numeric_limits<double>::quiet_NaN();
+      reading.gears.motor_angle_rad[j] = reading.angle_rad[j];
+      reading.gears.link_angle_rad[j] = drives_[j].link_counts() / BenchDrive::kLinkCountsPerRad;
+      reading.gears.joint_torque_nm[j] = 1e-3 * drives_[j].torque_mnm();
     }
     return true;
   }

@@ -74,9 +74,10 @@ py::array_t<double> evaluate_inertia(const Artifact& artifact, const DoubleArray
   return inertia_dispatch(inertia, artifact.joints(), clamped.data(), std::make_index_sequence<kMaxJoints>());
 }
 
+/// As the loop does: the law gets the angles of its side.
 StepReport step(Controller& controller, const DoubleArray& angle, const DoubleArray& reference_angle,
                 const DoubleArray& reference_speed, const DoubleArray& reference_acceleration, const DoubleArray& speed,
-                std::int64_t seq, bool valid) {
+                std::int64_t seq, bool valid, const py::dict& gears) {
   const int n = controller.joints();
   StepInput input;
   input.seq = seq;
@@ -86,6 +87,8 @@ StepReport step(Controller& controller, const DoubleArray& angle, const DoubleAr
   input.reference.angle = to_joint_array(reference_angle, n, "reference_angle");
   input.reference.speed = to_joint_array(reference_speed, n, "reference_speed");
   input.reference.acceleration = to_joint_array(reference_acceleration, n, "reference_acceleration");
+  input.gears = to_gear_reading(gears, n);
+  controller.choose_angle(input);
   return controller.step(input);
 }
 
@@ -145,7 +148,8 @@ void bind_step(py::module_& module) {
       .def(py::init<const Artifact&>(), py::arg("artifact"))
       .def("step", &step, py::arg("angle"), py::arg("reference_angle"), py::arg("reference_speed"),
            py::arg("reference_acceleration"), py::arg("speed"), py::arg("seq") = 0, py::arg("valid") = true,
-           "One sample; arrays of shape (joints,).")
+           py::arg("gears") = py::dict(),
+           "One sample; arrays of shape (joints,). gears: what is measured of joints that give, by name.")
       .def("reset", &Controller::reset, "Forget all state.")
       .def_property_readonly("joints", &Controller::joints)
       .def_property_readonly("sample_period_s", &Controller::sample_period_s);

@@ -20,11 +20,12 @@ std::unique_ptr<ControlLoop> make_loop(const Artifact& artifact, const Trajector
 
 /// The clock of the fail-safe policy is that of lock-step, seq T.
 void handle(ControlLoop& loop, std::int64_t seq, const DoubleArray& angle, const DoubleArray& speed,
-            std::int64_t foreign_messages) {
+            std::int64_t foreign_messages, const py::dict& gears) {
   RobotReading reading;
   reading.seq = seq;
   reading.angle_rad = to_joint_array(angle, loop.joints(), "angle");
   reading.speed_rad_s = to_joint_array(speed, loop.joints(), "speed");
+  reading.gears = to_gear_reading(gears, loop.joints());
   SampleConditions conditions;
   conditions.consecutive_foreign = foreign_messages;
   conditions.now_ns = seq * to_nanoseconds(loop.sample_period_s());
@@ -35,7 +36,7 @@ void bind_control_loop(py::module_& module) {
   py::class_<ControlLoop>(module, "ControlLoop", "One controller with its start, its policy and its limits.")
       .def(py::init(&make_loop), py::arg("artifact"), py::arg("trajectory"), py::arg("bumpless_start") = false)
       .def("handle", &handle, py::arg("seq"), py::arg("angle"), py::arg("speed"), py::arg("foreign_messages") = 0,
-           "Answer the reading of a sample newer than the last; the clock is seq T.")
+           py::arg("gears") = py::dict(), "Answer the reading of a sample newer than the last; the clock is seq T.")
       .def("reset_fault", &ControlLoop::reset_fault, "Leave a latched fault; whether that was possible.")
       .def_property_readonly(
           "torque", [](const ControlLoop& loop) { return to_numpy(loop.command().torque_nm, loop.joints()); },
@@ -67,6 +68,10 @@ void bind_plant_session(py::module_& module) {
                                   to_numpy(measured.speed, session.joints()));
           },
           "Measured (angle, speed) of the sample, each of shape (joints,).")
+      .def_property_readonly(
+          "gears",
+          [](const PlantSession& session) { return to_dict(session.measure(session.seq()).gears, session.joints()); },
+          "What the sensors of the gears measured, by name; empty for a robot without them.")
       .def_property_readonly(
           "angle", [](const PlantSession& session) { return to_numpy(session.truth().angle, session.joints()); })
       .def_property_readonly(

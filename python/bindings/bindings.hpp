@@ -34,6 +34,13 @@ py::object to_python(const Json& value);
 /// One value per joint from an array of shape [joints]. Throws InputError naming `name`, got and expected shape.
 JointArray to_joint_array(const DoubleArray& values, int joints, const char* name);
 
+/// What is measured of gears, from arrays of shape [joints] by name: motor_angle_rad, link_angle_rad, joint_torque_nm.
+/// Throws InputError naming anything else.
+GearReading to_gear_reading(const py::dict& gears, int joints);
+
+/// What is available, the other way round.
+py::dict to_dict(const GearReading& gears, int joints);
+
 /// The first `joints` entries as an array of shape [joints].
 py::array_t<double> to_numpy(const JointArray& values, int joints);
 

@@ -1,5 +1,6 @@
 // The Python extension quasilpv._runtime: its entry point, exceptions and conversions of joint arrays.
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <exception>
 #include <utility>
@@ -35,6 +36,44 @@ JointArray to_joint_array(const DoubleArray& values, int joints, const char* nam
   }
   JointArray result{};
   std::copy_n(values.data(), static_cast<std::size_t>(joints), result.begin());
+  return result;
+}
+
+namespace {
+
+struct GearMember {
+  const char* name;
+  GearSensor sensor;
+  JointArray GearReading::*values;
+};
+constexpr std::array<GearMember, 3> kGearMembers{{{"motor_angle_rad", kMotorAngle, &GearReading::motor_angle_rad},
+                                                  {"link_angle_rad", kLinkAngle, &GearReading::link_angle_rad},
+                                                  {"joint_torque_nm", kJointTorque, &GearReading::joint_torque_nm}}};
+
+}  // namespace
+
+GearReading to_gear_reading(const py::dict& gears, int joints) {
+  GearReading reading;
+  for (const auto& [key, value] : gears) {
+    const auto name = key.cast<std::string>();
+    const auto* const member = std::find_if(kGearMembers.begin(), kGearMembers.end(),
+                                            [&](const GearMember& known) { return name == known.name; });
+    if (member == kGearMembers.end()) {
+      throw InputError("argument", "gears", name, "motor_angle_rad, link_angle_rad or joint_torque_nm");
+    }
+    reading.available |= member->sensor;
+    reading.*(member->values) = to_joint_array(value.cast<DoubleArray>(), joints, member->name);
+  }
+  return reading;
+}
+
+py::dict to_dict(const GearReading& gears, int joints) {
+  py::dict result;
+  for (const GearMember& member : kGearMembers) {
+    if (gears.has(member.sensor)) {
+      result[member.name] = to_numpy(gears.*(member.values), joints);
+    }
+  }
   return result;
 }
 

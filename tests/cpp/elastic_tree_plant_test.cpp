@@ -97,7 +97,7 @@ TEST(ElasticTreePlant, keeps_its_energy_without_damping_and_loses_it_with) {
 TEST(ElasticTreePlant, shows_encoders_on_the_side_they_sit_on_and_the_motors_to_the_brake) {
   for (const bool on_motors : {true, false}) {
     ElasticTreeParameters parameters = elastic_arm(1.0, 0.0);
-    parameters.encoders_on_motors = on_motors;
+    parameters.sensors = on_motors ? kMotorAngle | kLinkAngle | kJointTorque : kLinkAngle;
     ElasticTreePlant plant(parameters);
     Eigen::VectorXd y = plant.initial_state({0.1, 0.2, 0.3, 0.4}, {});
     y.tail(kJoints).setConstant(0.7);
@@ -109,6 +109,11 @@ TEST(ElasticTreePlant, shows_encoders_on_the_side_they_sit_on_and_the_motors_to_
     EXPECT_EQ(pushed.encoder_angle()[1], on_motors ? y[kJoints + 1] : 0.2);
     EXPECT_EQ(pushed.encoder_speed()[1], on_motors ? 0.7 : 0.0);
     EXPECT_EQ(pushed.driven_speed()[1], 0.7);
+    ASSERT_TRUE(pushed.motors.has_value());
+    EXPECT_EQ(pushed.motors->sensors, parameters.sensors);
+    const ElasticGear& gear = parameters.gears[1];
+    EXPECT_NEAR(pushed.motors->joint_torque[1],
+                gear.stiffness_nm_rad * (y[kJoints + 1] - y[1]) + gear.damping_nm_s * 0.7, 1e-9);
     EXPECT_EQ(pushed.acceleration[0], free.acceleration[0]);  // a torque reaches the link through the spring only
     EXPECT_NEAR(pushed.driven_acceleration()[0] - free.driven_acceleration()[0], 1.0 / 0.2, 1e-9);
   }

@@ -64,6 +64,11 @@ TEST_F(HardwareDriver, is_paced_on_the_grid_and_gets_one_command_per_reading) {
     for (std::size_t j = 0; j < kJoints; ++j) {
       ASSERT_TRUE(std::isfinite(sample.applied_torque_nm[j]));
     }
+    if ((sample.flags & kMeasurementInvalid) == 0) {
+      ASSERT_EQ(sample.gears.available, kAllGearSensors);
+      const double wound = sample.gears.motor_angle_rad[1] - sample.gears.link_angle_rad[1];
+      ASSERT_NEAR(wound, sample.gears.joint_torque_nm[1] / BenchDrive::kStiffnessNmPerRad, 1e-4);
+    }
   }
 }
 

@@ -21,8 +21,8 @@ using testing::HasSubstr;
 constexpr WireIdentity kIdentity{42, -7, 3};
 constexpr std::int64_t kSecond = kNanosecondsPerSecond;
 
-measurement_v2 measurement(std::int64_t seq, double angle = 0.0) {
-  measurement_v2 message{};
+measurement_v3 measurement(std::int64_t seq, double angle = 0.0) {
+  measurement_v3 message{};
   message.seq = seq;
   message.angle_rad[0] = angle;
   return message;
@@ -39,7 +39,7 @@ class TwoEnds : public testing::Test {
 TEST_F(TwoEnds, carry_a_measurement_one_way_and_its_command_the_other) {
   plant_.send(measurement(4, 0.5));
   ASSERT_TRUE(controller_.receive(kSecond));
-  measurement_v2 received{};
+  measurement_v3 received{};
   ASSERT_TRUE(controller_.take(received));
   EXPECT_EQ(received.seq, 4);
   EXPECT_EQ(received.angle_rad[0], 0.5);
@@ -57,7 +57,7 @@ TEST_F(TwoEnds, when_nothing_arrives_expect_a_wait_that_ends) {
   const std::int64_t start_ns = monotonic_ns();
   EXPECT_FALSE(controller_.receive(20 * kNanosecondsPerMillisecond));
   EXPECT_GE(monotonic_ns() - start_ns, 20 * kNanosecondsPerMillisecond);
-  measurement_v2 message{};
+  measurement_v3 message{};
   EXPECT_FALSE(controller_.take(message));
 }
 
@@ -66,7 +66,7 @@ TEST_F(TwoEnds, when_several_measurements_are_pending_expect_only_the_newest) {
     plant_.send(measurement(seq));
   }
   ASSERT_TRUE(controller_.receive(kSecond));
-  measurement_v2 received{};
+  measurement_v3 received{};
   ASSERT_TRUE(controller_.take(received));
   EXPECT_EQ(received.seq, 3);
   EXPECT_FALSE(controller_.take(received));
@@ -79,14 +79,14 @@ TEST_F(TwoEnds, F4_when_packets_are_reordered_expect_the_old_ones_ignored_and_co
     plant_.send(measurement(seq));
   }
   controller_.receive(kSecond);
-  measurement_v2 received{};
+  measurement_v3 received{};
   ASSERT_TRUE(controller_.take(received));
   EXPECT_EQ(received.seq, 7);
   EXPECT_EQ(controller_.counters().old, 2);
 }
 
 TEST_F(TwoEnds, F4_when_a_measurement_is_repeated_expect_it_counted_and_offered_again) {
-  measurement_v2 received{};
+  measurement_v3 received{};
   for (int i = 0; i < 3; ++i) {
     plant_.send(measurement(9));
     controller_.receive(kSecond);
@@ -100,7 +100,7 @@ TEST_F(TwoEnds, F4_when_a_duplicate_differs_expect_the_first_one_kept) {
   plant_.send(measurement(9, 1.0));
   plant_.send(measurement(9, 2.0));
   controller_.receive(kSecond);
-  measurement_v2 received{};
+  measurement_v3 received{};
   ASSERT_TRUE(controller_.take(received));
   EXPECT_EQ(received.angle_rad[0], 1.0);
   EXPECT_EQ(controller_.counters().duplicates, 0);
@@ -109,7 +109,7 @@ TEST_F(TwoEnds, F4_when_a_duplicate_differs_expect_the_first_one_kept) {
 }
 
 TEST_F(TwoEnds, F5_when_foreign_messages_arrive_expect_a_run_of_them_counted_until_a_good_one) {
-  measurement_v2 foreign = measurement(1);
+  measurement_v3 foreign = measurement(1);
   foreign.joints = kIdentity.joints;
   Packet packet;
   foreign.session = kIdentity.session + 1;
@@ -132,7 +132,7 @@ TEST_F(TwoEnds, F5_when_foreign_messages_arrive_expect_a_run_of_them_counted_unt
 }
 
 Packet foreign_measurement() {
-  measurement_v2 foreign = measurement(1);
+  measurement_v3 foreign = measurement(1);
   foreign.joints = kIdentity.joints;
   foreign.session = kIdentity.session + 1;
   foreign.artifact_hash = kIdentity.artifact_hash;
@@ -153,7 +153,7 @@ TEST_F(TwoEnds, F5_when_a_good_message_ends_a_foreign_run_in_the_same_drain_expe
 }
 
 TEST_F(TwoEnds, F6_when_a_message_is_truncated_anywhere_or_of_another_type_expect_it_counted_and_not_accepted) {
-  measurement_v2 whole = measurement(1);
+  measurement_v3 whole = measurement(1);
   whole.joints = kIdentity.joints;
   whole.session = kIdentity.session;
   whole.artifact_hash = kIdentity.artifact_hash;
@@ -168,7 +168,7 @@ TEST_F(TwoEnds, F6_when_a_message_is_truncated_anywhere_or_of_another_type_expec
   encode(command, packet);
   controller_.inject(Channel::kMeasurement, packet.bytes.data(), static_cast<std::size_t>(packet.size));
   controller_.receive(0);
-  EXPECT_EQ(controller_.counters().wrong_length, measurement_v2{}.getEncodedSize() + 1);
+  EXPECT_EQ(controller_.counters().wrong_length, measurement_v3{}.getEncodedSize() + 1);
   EXPECT_EQ(controller_.counters().accepted, 0);
 }
 
@@ -203,7 +203,7 @@ TEST_F(TwoEnds, F6_when_random_bytes_arrive_expect_each_counted_and_none_accepte
   for (int i = 0; i < kPackets; ++i) {
     const std::uint8_t* bytes = noise.data() + random() % (noise.size() - kMaxMessageBytes);
     // Every other packet has the right length, so that the checks behind the length see random bytes too.
-    const auto right = static_cast<std::size_t>(measurement_v2{}.getEncodedSize());
+    const auto right = static_cast<std::size_t>(measurement_v3{}.getEncodedSize());
     const std::size_t size = i % 2 == 0 ? right : random() % kMaxMessageBytes;
     controller_.inject(Channel::kMeasurement, bytes, size);
     controller_.receive(0);
@@ -246,7 +246,7 @@ TEST(LcmLink, carries_messages_between_two_ends_and_ignores_its_own_events) {
   LcmLink plant(Side::kPlant, kIdentity, own_url(), false);
   plant.send(EventCode::kStarted, 0);
   plant.send(measurement(3, 0.25));
-  measurement_v2 received{};
+  measurement_v3 received{};
   event_v2 event{};
   bool measured = false;
   bool told = false;

@@ -69,8 +69,8 @@ inline RunRecord run_in_process(const Artifact& law, const Scenario& experiment)
 
 inline WireIdentity identity_of(const Artifact& artifact) { return {11, artifact.hash_prefix(), artifact.joints()}; }
 
-inline measurement_v2 measurement(std::int64_t seq, const JointArray& angle = kStart) {
-  measurement_v2 message{};
+inline measurement_v3 measurement(std::int64_t seq, const JointArray& angle = kStart) {
+  measurement_v3 message{};
   message.seq = seq;
   std::copy(angle.begin(), angle.end(), message.angle_rad);
   return message;

@@ -66,7 +66,7 @@ class AuthenticatedEnds : public ::testing::Test {
 };
 
 TEST_F(AuthenticatedEnds, with_one_key_understand_each_other) {
-  measurement_v2 measurement{};
+  measurement_v3 measurement{};
   measurement.seq = 3;
   plant_.send(measurement);
   plant_.send(EventCode::kStarted, 0);
@@ -167,7 +167,7 @@ TEST_F(AuthenticatedEnds, when_a_reset_is_replayed_expect_it_refused_and_a_new_o
 TEST_F(AuthenticatedEnds, when_only_one_side_has_the_key_expect_neither_to_accept_the_other) {
   const auto [controller, plant] = InProcessLink::create_pair(kIdentity);
   controller->authenticate_with(key_of(1));
-  plant->send(measurement_v2{});
+  plant->send(measurement_v3{});
   controller->send(command(0));
   controller->receive(0);
   plant->receive(0);

@@ -46,7 +46,7 @@ void reseal(Packet& packet) {
 
 template <class Message>
 class EveryMessage : public testing::Test {};
-using Messages = testing::Types<measurement_v2, command_v2, telemetry_v1, event_v2>;
+using Messages = testing::Types<measurement_v3, command_v2, telemetry_v2, event_v2>;
 TYPED_TEST_SUITE(EveryMessage, Messages);
 
 TYPED_TEST(EveryMessage, fits_one_unfragmented_packet) {
@@ -103,8 +103,8 @@ TYPED_TEST(EveryMessage, when_session_or_artifact_differ_expect_it_refused) {
 
 TEST(Messages, when_the_number_of_joints_differs_expect_the_artifact_refused) {
   Packet packet;
-  encode(sealed_message<measurement_v2>(), packet);
-  EXPECT_EQ(decode_status<measurement_v2>(packet, {42, -7, 2}), DecodeStatus::kWrongArtifact);
+  encode(sealed_message<measurement_v3>(), packet);
+  EXPECT_EQ(decode_status<measurement_v3>(packet, {42, -7, 2}), DecodeStatus::kWrongArtifact);
 }
 
 TEST(Messages, keep_every_bit_of_a_double) {
@@ -161,11 +161,11 @@ TYPED_TEST(EveryMessage, when_a_number_of_it_is_beyond_what_any_side_sends_expec
   for (const std::int64_t value : {kLowest, std::int64_t{-1}, kHighest}) {
     EXPECT_EQ(status_with(&TypeParam::utime, value), DecodeStatus::kOutOfBounds) << value;
     EXPECT_EQ(status_with(&TypeParam::seq, value), DecodeStatus::kOutOfBounds) << value;
-    if constexpr (!std::is_same_v<TypeParam, telemetry_v1>) {
+    if constexpr (!std::is_same_v<TypeParam, telemetry_v2>) {
       EXPECT_EQ(status_with(&TypeParam::period_ns, value), DecodeStatus::kOutOfBounds) << value;
     }
   }
-  if constexpr (!std::is_same_v<TypeParam, telemetry_v1>) {
+  if constexpr (!std::is_same_v<TypeParam, telemetry_v2>) {
     EXPECT_EQ(status_with(&TypeParam::mode, 2), DecodeStatus::kOutOfBounds);
     EXPECT_EQ(status_with(&TypeParam::mode, -1), DecodeStatus::kOutOfBounds);
     EXPECT_EQ(status_with(&TypeParam::mode, 1), DecodeStatus::kAccepted);
@@ -186,7 +186,9 @@ TEST(Messages, when_a_code_has_no_meaning_expect_it_refused) {
     EXPECT_EQ(status_with(&event_v2::code, code), DecodeStatus::kOutOfBounds) << code;
     EXPECT_EQ(status_with(&event_v2::source, code == 5 ? 4 : code), DecodeStatus::kOutOfBounds) << code;
     EXPECT_EQ(status_with(&command_v2::state, code == 0 ? 6 : code), DecodeStatus::kOutOfBounds) << code;
+    EXPECT_EQ(status_with(&measurement_v3::available, code == 0 || code == 5 ? 8 : code), DecodeStatus::kOutOfBounds);
   }
+  EXPECT_EQ(status_with(&measurement_v3::available, 5), DecodeStatus::kAccepted);
 }
 
 TEST(Messages, a_sender_has_a_name_of_its_own_that_holds_the_process) {

@@ -91,7 +91,7 @@ TEST(PlantLoop, when_the_first_copy_of_every_measurement_is_lost_expect_the_same
   auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(law));
   std::thread thread([&, link = controller_end.get()] {
     ControlLoop loop(law, trajectory(), {});
-    measurement_v2 received{};
+    measurement_v3 received{};
     std::int64_t lost = -1;
     for (std::int64_t answered = 0; answered < kSamples && link->receive(kPatience);) {
       if (!link->take(received)) {
@@ -132,7 +132,7 @@ TEST(PlantLoop, F7_when_commands_stop_in_real_time_expect_the_torque_held_for_20
   const Scenario experiment = scenario(kSamples);
   auto [controller_end, plant_end] = InProcessLink::create_pair(identity_of(artifact()));
   std::thread thread([link = controller_end.get()] {
-    measurement_v2 received{};
+    measurement_v3 received{};
     for (std::int64_t newest = 0; newest < kAnswered && link->receive(kPatience);) {
       if (link->take(received)) {
         newest = received.seq;
@@ -176,7 +176,7 @@ TEST(PlantLoop, F7_when_commands_stop_in_real_time_expect_the_torque_held_for_20
 
 /// A controller that answers `bad_from` and all later measurements with the torque `bad`, those before with 5 N m.
 void answer_with(Link& link, std::int64_t bad_from, double bad, const std::atomic<bool>& over) {
-  measurement_v2 received{};
+  measurement_v3 received{};
   while (!over) {
     link.receive(kMillisecond);
     if (link.take(received)) {

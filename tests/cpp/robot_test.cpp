@@ -84,7 +84,7 @@ class OverALink : public ::testing::Test {
 };
 
 TEST_F(OverALink, a_reading_and_a_command_keep_their_numbers) {
-  measurement_v2 sent = measurement(4, {0.1, 0.2, 0.3});
+  measurement_v3 sent = measurement(4, {0.1, 0.2, 0.3});
   sent.speed_rad_s[2] = -5.0;
   plant_.send(sent);
   RobotReading reading;

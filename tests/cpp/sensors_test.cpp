@@ -26,7 +26,7 @@ TEST_P(EncoderOfBits, reads_the_nearest_multiple_of_its_quantum) {
   double largest_error = 0.0;
   for (int i = 0; i < 2000; ++i) {
     const double angle = uniform(-7.0, 7.0);
-    const double read = sensors.measure(i, {angle}, {}).angle[0];
+    const double read = sensors.measure(i, PlantSample{{angle}}).angle[0];
     const double counts = read / quantum;
     EXPECT_NEAR(counts, std::round(counts), 1e-9 * std::max(1.0, std::abs(counts)));
     EXPECT_LE(std::abs(read - angle), 0.5 * quantum * (1.0 + 1e-9));
@@ -41,7 +41,7 @@ TEST(Sensors, when_bits_and_noise_are_zero_expect_the_truth_to_the_bit) {
   Sensors sensors({0, 0.0, 5}, 3, kPeriod);
   const JointArray angle{0.1, -1.0 / 3.0, 1e-9};
   const JointArray speed{-0.2, 2.0 / 3.0, 1e9};
-  const Measurement measurement = sensors.measure(42, angle, speed);
+  const Measurement measurement = sensors.measure(42, PlantSample{angle, speed});
   EXPECT_EQ(measurement.seq, 42);
   EXPECT_EQ(measurement.angle, angle);
   EXPECT_EQ(measurement.speed, speed);
@@ -56,7 +56,7 @@ TEST(Sensors, quantisation_is_odd_and_rounds_ties_away_from_zero) {
 
 TEST(Sensors, entries_past_the_joints_stay_zero) {
   Sensors sensors({0, 1.0, 5}, 2, kPeriod);
-  const Measurement measurement = sensors.measure(0, {1.0, 1.0, 1.0}, {1.0, 1.0, 1.0});
+  const Measurement measurement = sensors.measure(0, PlantSample{{1.0, 1.0, 1.0}, {1.0, 1.0, 1.0}});
   EXPECT_EQ(measurement.angle[2], 0.0);
   EXPECT_EQ(measurement.speed[2], 0.0);
 }
@@ -64,20 +64,50 @@ TEST(Sensors, entries_past_the_joints_stay_zero) {
 TEST(Sensors, noise_is_on_the_speed_only_and_the_same_for_the_same_seed) {
   Sensors first({0, 0.05, 7}, 3, kPeriod), second({0, 0.05, 7}, 3, kPeriod), other({0, 0.05, 8}, 3, kPeriod);
   for (int k = 0; k < 100; ++k) {
-    const JointArray angle{0.1, 0.2, 0.3};
-    const Measurement measurement = first.measure(k, angle, {});
-    EXPECT_EQ(measurement.angle, angle);
-    EXPECT_EQ(measurement.speed, second.measure(k, angle, {}).speed);
-    EXPECT_NE(measurement.speed, other.measure(k, angle, {}).speed);
+    const PlantSample truth{{0.1, 0.2, 0.3}};
+    const Measurement measurement = first.measure(k, truth);
+    EXPECT_EQ(measurement.angle, truth.angle);
+    EXPECT_EQ(measurement.speed, second.measure(k, truth).speed);
+    EXPECT_NE(measurement.speed, other.measure(k, truth).speed);
   }
 }
 
 TEST(Sensors, a_filtered_speed_starts_at_the_first_and_forgets_a_step_exponentially) {
   Sensors sensors({0, 0.0, 0, 4e-3}, 1, kPeriod);
-  EXPECT_EQ(sensors.measure(0, {}, {2.0}).speed[0], 2.0);
+  EXPECT_EQ(sensors.measure(0, PlantSample{{}, {2.0}}).speed[0], 2.0);
   for (int k = 1; k <= 20; ++k) {
-    EXPECT_NEAR(sensors.measure(k, {}, {3.0}).speed[0], 3.0 - std::exp(-k * kPeriod / 4e-3), 1e-14);
+    EXPECT_NEAR(sensors.measure(k, PlantSample{{}, {3.0}}).speed[0], 3.0 - std::exp(-k * kPeriod / 4e-3), 1e-14);
   }
+}
+
+TEST(Sensors, encoders_on_both_sides_have_counts_of_their_own_and_torques_are_exact) {
+  SensorOptions options{12, 0.0, 0};
+  options.link_encoder_bits = 8;
+  PlantSample truth{{0.1, -0.2}, {3.0, 4.0}};
+  truth.motors = MotorSample{{0.1234, -0.2345}, {5.0, 6.0}, {}, {7.0 / 3.0, -8.0}, kAllGearSensors};
+  const Measurement measured = Sensors(options, 2, kPeriod).measure(0, truth);
+  const double fine = std::ldexp(2.0 * 3.14159265358979323846, -12), coarse = 16.0 * fine;
+  EXPECT_EQ(measured.gears.available, kAllGearSensors);
+  for (std::size_t j = 0; j < 2; ++j) {
+    EXPECT_NEAR(measured.gears.motor_angle_rad[j], std::round(truth.motors->angle[j] / fine) * fine, 1e-15);
+    EXPECT_NEAR(measured.gears.link_angle_rad[j], std::round(truth.angle[j] / coarse) * coarse, 1e-15);
+    EXPECT_EQ(measured.gears.joint_torque_nm[j], truth.motors->joint_torque[j]);
+  }
+  EXPECT_EQ(measured.angle, measured.gears.motor_angle_rad);
+  EXPECT_EQ(measured.speed[0], 5.0);
+  EXPECT_EQ(measured.gears.motor_angle_rad[2], 0.0);
+}
+
+TEST(Sensors, what_a_robot_does_not_have_is_not_said) {
+  PlantSample truth{{0.1}, {3.0}};
+  EXPECT_EQ(Sensors({20, 0.0, 0}, 1, kPeriod).measure(0, truth).gears.available, kNoGearSensor);
+  truth.motors = MotorSample{{0.2}, {5.0}, {}, {7.0}, kLinkAngle};
+  const Measurement measured = Sensors({0, 0.0, 0}, 1, kPeriod).measure(0, truth);
+  EXPECT_EQ(measured.gears.available, kLinkAngle);
+  EXPECT_EQ(measured.angle[0], 0.1);
+  EXPECT_EQ(measured.gears.link_angle_rad[0], 0.1);
+  EXPECT_EQ(measured.gears.motor_angle_rad[0], 0.0);
+  EXPECT_EQ(measured.gears.joint_torque_nm[0], 0.0);
 }
 
 TEST(GaussianNoise, is_the_box_muller_transform_of_the_standard_generator) {

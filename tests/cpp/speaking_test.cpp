@@ -48,7 +48,7 @@ class InARun : public ::testing::TestWithParam<bool> {
   }
 
   void exchange(std::int64_t seq, ControllerState state) {
-    measurement_v2 measurement{};
+    measurement_v3 measurement{};
     measurement.seq = seq;
     plant_.send(measurement);
     controller_.receive(0);
@@ -145,7 +145,7 @@ TEST(BeforeARun, F19_the_plant_hears_a_refusal_that_is_meant_for_it_and_nothing_
 
 TEST_P(InARun, F22_a_measurement_of_a_second_plant_never_reaches_the_law_and_is_a_fault_once_the_first_goes_on) {
   LinkRobot robot(controller_);
-  measurement_v2 other{};
+  measurement_v3 other{};
   other.sender = kStranger;
   other.angle_rad[0] = 9.0;
   for (const std::int64_t seq : {0, 10, 11, 1000}) {
@@ -155,7 +155,7 @@ TEST_P(InARun, F22_a_measurement_of_a_second_plant_never_reaches_the_law_and_is_
     EXPECT_EQ(robot.take_fault(), FaultCause::kNone);
   }
   EXPECT_EQ(controller_.counters().second_sender, 4);
-  measurement_v2 next{};
+  measurement_v3 next{};
   next.seq = 11;
   plant_.send(next);
   RobotReading reading;
@@ -225,7 +225,7 @@ TEST_P(BeforeARun, F24_the_other_mode_or_rate_is_refused_from_any_message_and_by
   ended.code = static_cast<std::int32_t>(EventCode::kEnded);
   for (const auto& [identity, conflict] :
        {std::pair{other_mode, Conflict::kOtherMode}, {other_rate, Conflict::kOtherRate}}) {
-    say(*fresh_.first, measurement_v2{}, identity);
+    say(*fresh_.first, measurement_v3{}, identity);
     EXPECT_EQ(fresh_.first->peers().take_conflict(), conflict);
     ended.source = static_cast<std::int32_t>(Side::kPlant);
     say(*fresh_.first, ended, identity);
@@ -237,11 +237,11 @@ TEST_P(BeforeARun, F24_the_other_mode_or_rate_is_refused_from_any_message_and_by
     EXPECT_EQ(fresh_.second->peers().take_conflict(), conflict);
   }
   EXPECT_EQ(fresh_.first->counters().other_mode, 2);
-  say(*fresh_.first, measurement_v2{}, other_artifact);
+  say(*fresh_.first, measurement_v3{}, other_artifact);
   EXPECT_EQ(fresh_.first->peers().take_conflict(), Conflict::kOtherRate);
   EXPECT_EQ(fresh_.first->counters().wrong_artifact, 1);
   LinkRobot robot(*fresh_.first);
-  say(*fresh_.first, measurement_v2{}, other_mode);
+  say(*fresh_.first, measurement_v3{}, other_mode);
   EXPECT_EQ(robot.take_request(), RobotRequest::kRefuse);
 }
 
@@ -249,7 +249,7 @@ TEST_P(BeforeARun, another_run_on_the_same_address_is_known_by_its_session) {
   EXPECT_EQ(fresh_.first->foreign_session(), std::nullopt);
   WireIdentity other_session = kIdentity;
   other_session.session = 43;
-  say(*fresh_.first, measurement_v2{}, other_session);
+  say(*fresh_.first, measurement_v3{}, other_session);
   EXPECT_EQ(fresh_.first->foreign_session(), 43);
 }
 

@@ -89,9 +89,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const Channel channel = kHeard[data[0] % kHeard.size()];
   const std::vector<std::uint8_t> raw(data + 1, data + size);
   for (const std::vector<std::uint8_t>& bytes : {raw, with_checksum(raw)}) {
-    decode_as<measurement_v2>(bytes);
+    decode_as<measurement_v3>(bytes);
     decode_as<command_v2>(bytes);
-    decode_as<telemetry_v1>(bytes);
+    decode_as<telemetry_v2>(bytes);
     decode_as<event_v2>(bytes);
     receive(channel, bytes, false);
     receive(channel, bytes, true);

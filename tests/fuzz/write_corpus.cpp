@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
   Json watched = artifact_table("dob-acceleration", 1);
   watched["law"]["lyapunov_bound"] = TestArm{1}.lyapunov_bound();
   write_twins("lyapunov-bound", watched);
-  write(folder / "message" / "measurement", message_seed<measurement_v2>(0));
+  write(folder / "message" / "measurement", message_seed<measurement_v3>(0));
   write(folder / "message" / "command", message_seed<command_v2>(1));
   write(folder / "message" / "event", message_seed<event_v2>(2));
 }

@@ -91,6 +91,47 @@ def test_when_torques_are_held_expect_the_motion_of_the_prototype(n: int, integr
     assert np.abs(expected[-1, :n] - expected[0, :n]).max() > 1e-3
 
 
+@pytest.mark.parametrize(
+    ("side", "torque_sensor", "names"),
+    [
+        ("motor", False, {"motor_angle_rad"}),
+        ("link", False, {"link_angle_rad"}),
+        ("both", False, {"motor_angle_rad", "link_angle_rad"}),
+        ("motor", True, {"motor_angle_rad", "joint_torque_nm"}),
+        ("both", True, {"motor_angle_rad", "link_angle_rad", "joint_torque_nm"}),
+    ],
+)
+def test_when_gears_have_sensors_expect_those_and_no_others_with_the_motion_of_the_prototype(
+    side: str, torque_sensor: bool, names: set[str]
+) -> None:
+    arm, n = random_arm(2, 32), 2
+    content = document(arm, IDA, side=side)
+    if torque_sensor:
+        content["plant"]["torque_sensor"] = True
+    content["sensors"] |= {"encoder_bits": 16, "link_encoder_bits": 12}
+    assert Scenario.from_document(content).to_document() == content
+    session = _runtime.PlantSession(parsed(content), T)
+    torques = np.random.default_rng(2).normal(0.0, 20.0, (30, n))
+    start = np.concatenate([np.full(n, 0.2), 0.2 + arm.tree.gravity(np.full(n, 0.2)) / arm.stiffness, np.zeros(2 * n)])
+    expected = arm.run(start, torques, T, 20, lambda t: external(n, t))
+    for k, torque in enumerate(torques):
+        q, th, w, v = expected[k].reshape(4, n)
+        seen = session.gears
+        assert set(seen) == names
+        if "motor_angle_rad" in names:
+            np.testing.assert_allclose(seen["motor_angle_rad"], th, rtol=0, atol=np.pi / 2**16 + 2e-8)
+        if "link_angle_rad" in names:
+            turn = 2**16 if side == "link" else 2**12
+            np.testing.assert_allclose(seen["link_angle_rad"], q, rtol=0, atol=np.pi / turn + 2e-8)
+            counts = seen["link_angle_rad"] * turn / (2 * np.pi)
+            np.testing.assert_allclose(counts, np.rint(counts), rtol=0, atol=1e-9)
+        if "joint_torque_nm" in names:
+            np.testing.assert_allclose(seen["joint_torque_nm"], arm.spring(q, th, w, v), rtol=0, atol=1e-3)
+        first = "link_angle_rad" if side == "link" else "motor_angle_rad"
+        np.testing.assert_array_equal(session.measure()[0], seen[first])
+        session.advance(torque)
+
+
 def free_joint(damping: float) -> ElasticArm:
     """One joint about a vertical axis: two discs and a spring."""
     arm = random_arm(1, 5)
@@ -143,7 +184,7 @@ def test_when_a_gear_is_none_expect_it_refused_by_name_on_both_sides(field: str,
 
 
 def test_when_encoders_sit_nowhere_expect_it_refused_by_name() -> None:
-    content = document(random_arm(2, 3), IDA, side="both")
+    content = document(random_arm(2, 3), IDA, side="gear")
     for read in (parsed, lambda tree: Scenario.from_document(tree, "scenario")):
         with pytest.raises(InputError, match=r"encoder_side"):
             read(content)

@@ -182,7 +182,7 @@ def test_F13_when_real_time_is_not_permitted_expect_one_warning_and_telemetry_th
 ) -> None:
     flags = []
     wire = lcm.LCM(experiment.url)
-    wire.subscribe("QLPV_TELEMETRY", lambda _, data: flags.append(message_types.telemetry_v1.decode(data).realtime))
+    wire.subscribe("QLPV_TELEMETRY", lambda _, data: flags.append(message_types.telemetry_v2.decode(data).realtime))
     controller = experiment.start(without_privileges(experiment.controller_command("--priority", "50")))
     assert experiment.run(experiment.simulator_command())[0] == 0
     code, report, errors = finish(controller)

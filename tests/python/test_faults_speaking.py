@@ -210,7 +210,7 @@ class WireController:
         self._wire.subscribe("QLPV_MEASUREMENT", self._answer)
 
     def _answer(self, _: str, data: bytes) -> None:
-        heard, answer = self._types.measurement_v2.decode(data), self._types.command_v2()
+        heard, answer = self._types.measurement_v3.decode(data), self._types.command_v2()
         for member in ("utime", "seq", "session", "artifact_hash", "period_ns", "mode", "joints"):
             setattr(answer, member, getattr(heard, member))
         answer.sender, answer.receiver, answer.state = 99, heard.sender, 2

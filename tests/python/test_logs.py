@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import lzma
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -36,6 +37,7 @@ from two_processes import executable
 
 pytest_plugins = ["two_processes", "reference.logged_run"]
 
+DATA = Path(__file__).parents[1] / "data"
 COMPARED = (
     ("measurement", ()),
     ("command", ("state",)),  # a run in one process has no fail-safe
@@ -238,26 +240,44 @@ def test_when_a_log_is_replayed_expect_every_command_bit_for_bit(tracked: tuple[
     assert (shown.samples, shown.compared, shown.first_difference, shown.fault_seq) == (SAMPLES, SAMPLES, None, None)
 
 
-def test_when_a_log_is_of_the_first_version_of_the_messages_expect_the_same_samples_and_the_same_replay(
-    tracked: tuple[TrackResult, Path], tmp_path: Path
+@pytest.mark.parametrize("age", [1, 2])
+def test_when_a_log_is_of_an_earlier_version_of_the_messages_expect_the_same_samples_and_the_same_replay(
+    age: int, tracked: tuple[TrackResult, Path], tmp_path: Path
 ) -> None:
-    def as_first_version(_: int, event: Event) -> Event:
-        if len(CHANNELS.get(event.channel, ())) < 2:
+    def as_then(_: int, event: Event) -> Event:
+        names = CHANNELS.get(event.channel, ())
+        if len(names) < 2:
             return event
-        new, old = (message_type(name) for name in CHANNELS[event.channel])
+        new, old = message_type(names[0]), message_type(names[min(age, len(names) - 1)])
         records = old.new(1)
         for member in old.record.names[1:-1]:
-            records[member] = np.frombuffer(event.data, new.record)[member]
+            if member != "flags" or member in new.record.names:
+                records[member] = np.frombuffer(event.data, new.record)[member]
         return event._replace(data=old.encode(records)[0])
 
-    now, before = read_log(tracked[1]), read_log(edited(tracked[1], tmp_path / "old.lcmlog", as_first_version))
-    for channel in ("measurement", "command", "event"):
-        old = before[channel]
-        assert old.type.name == f"{channel}_v1"
+    now, before = read_log(tracked[1]), read_log(edited(tracked[1], tmp_path / "old.lcmlog", as_then))
+    for channel in ("measurement", "command", "telemetry", "event", "truth"):
+        old, names = before[channel], CHANNELS[f"QLPV_{channel.upper()}"]
+        assert old.type.name == names[min(age, len(names) - 1)]
         assert (old.refused, old.records.size) == ({}, now[channel].records.size)
-        for member in old.type.record.names[1:-1]:
+        for member in set(old.type.record.names[1:-1]) & set(now[channel].type.record.names):
             np.testing.assert_array_equal(old.records[member], now[channel].records[member])
     assert replay(before) == replay(now)
+    assert logged_result(before).row() == logged_result(now).row()
+
+
+def test_when_a_log_was_written_before_readings_had_gears_expect_it_read_and_replayed(tmp_path: Path) -> None:
+    """Written by the version before, of an arm that holds its posture."""
+    path = tmp_path / "run.lcmlog"
+    path.write_bytes(lzma.decompress((DATA / "logs" / "hold-measurement-v2.lcmlog.xz").read_bytes()))
+    log = read_log(path)
+    types = {name: log[name].type.name for name in ("measurement", "telemetry", "truth")}
+    assert types == {"measurement": "measurement_v2", "telemetry": "telemetry_v1", "truth": "truth_v1"}
+    assert {name: log[name].records.size for name in types} == dict.fromkeys(types, 25)
+    assert not any(messages.refused for messages in log.channels.values())
+    shown = replay(log)
+    assert (shown.samples, shown.compared, shown.fault_seq) == (25, 25, None)
+    np.testing.assert_array_equal(logged_result(log).run.true_angle_rad, log["truth"].samples["angle_rad"][:, :3])
 
 
 def test_when_one_bit_of_one_command_is_another_expect_the_replay_to_name_it(

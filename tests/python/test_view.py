@@ -41,7 +41,7 @@ from quasilpv.view.page import HOST, Page
 from quasilpv.view.playback import Motion, Playback, Player
 
 ARM = robot("arm3")
-TELEMETRY = message_type("telemetry_v1")
+TELEMETRY = message_type("telemetry_v2")
 PATIENCE_S = 30.0
 
 

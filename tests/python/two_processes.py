@@ -146,7 +146,7 @@ class WirePlant:
         self._commands.append(command)
 
     def send(self, seq: int, angles: Sequence[float], speeds: Sequence[float] = (), *, session_offset: int = 0) -> None:
-        message = self._types.measurement_v2()
+        message = self._types.measurement_v3()
         message.seq, message.session, message.artifact_hash = seq, self._session + session_offset, self._hash
         message.joints = self._joints
         message.sender, message.period_ns = self._sender, self._period_ns

@@ -37,7 +37,7 @@ WireIdentity identity() {
 
 /// The controller's side: one command per measurement, until `last_seq` or silence.
 void answer(Link& link, std::int64_t last_seq) {
-  measurement_v2 measurement{};
+  measurement_v3 measurement{};
   command_v2 command{};
   std::int64_t deadline = monotonic_ns() + kGiveUpAfter;
   while (monotonic_ns() < deadline) {
@@ -54,7 +54,7 @@ void answer(Link& link, std::int64_t last_seq) {
 
 /// Sends measurement `seq` until its command arrives; counts what had to be sent again.
 void round_trip(Link& link, std::int64_t seq, std::int64_t& repeated) {
-  measurement_v2 measurement{};
+  measurement_v3 measurement{};
   measurement.seq = seq;
   command_v2 command{};
   const std::int64_t deadline = monotonic_ns() + kGiveUpAfter;
@@ -131,7 +131,7 @@ nlohmann::json measure_in_process(std::int64_t samples) {
 nlohmann::json measure_authentication(std::int64_t samples) {
   const MessageKey key({1, 2, 3});
   Packet packet;
-  encode(measurement_v2{}, packet);
+  encode(measurement_v3{}, packet);
   const auto size = static_cast<std::size_t>(packet.size);
   constexpr int kRounds = 11;
   const auto time = [&](const auto& call) {

@@ -1,6 +1,6 @@
 """The C++ runtime library. All arrays are of double; joint arrays have shape (joints,), SI units."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -89,8 +89,14 @@ class Controller:
         speed: npt.ArrayLike,
         seq: int = 0,
         valid: bool = True,
+        gears: Mapping[str, npt.ArrayLike] = ...,
     ) -> StepReport:
-        """One sample; arrays of shape (joints,)."""
+        """One sample; arrays of shape (joints,).
+
+        Args:
+            gears: what is measured of joints that give, by name: motor_angle_rad, link_angle_rad, joint_torque_nm. A
+                law that controls one side gets the angles of that side.
+        """
 
     def reset(self) -> None:
         """Forget all state."""
@@ -160,7 +166,14 @@ class ControlLoop:
     """One controller with its start, its policy and its limits."""
 
     def __init__(self, artifact: Artifact, trajectory: Trajectory, bumpless_start: bool = False) -> None: ...
-    def handle(self, seq: int, angle: npt.ArrayLike, speed: npt.ArrayLike, foreign_messages: int = 0) -> None:
+    def handle(
+        self,
+        seq: int,
+        angle: npt.ArrayLike,
+        speed: npt.ArrayLike,
+        foreign_messages: int = 0,
+        gears: Mapping[str, npt.ArrayLike] = ...,
+    ) -> None:
         """Answer the reading of a sample newer than the last; the clock is seq T."""
 
     def reset_fault(self) -> bool:
@@ -196,6 +209,10 @@ class PlantSession:
     def samples(self) -> int: ...
     def measure(self) -> tuple[_Array, _Array]:
         """Measured (angle, speed) of the sample, each of shape (joints,)."""
+
+    @property
+    def gears(self) -> dict[str, _Array]:
+        """What the sensors of the gears measured, by name; empty for a robot without them."""
 
     @property
     def angle(self) -> _Array: ...

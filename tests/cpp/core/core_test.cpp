@@ -10,7 +10,7 @@
 #include "quasilpv/run_controller.hpp"
 
 // Nobody who includes its headers sees a transport, and nobody needs one to link it.
-#if __has_include("quasilpv/link.hpp") || __has_include("quasilpv/telemetry_v1.hpp")
+#if __has_include("quasilpv/link.hpp") || __has_include("quasilpv/telemetry_v2.hpp")
 #error "quasilpv::core must not bring the headers of quasilpv::link"
 #endif
 

@@ -26,6 +26,7 @@ struct MotorPidParameters final : ObserverParameters {
   JointArray coulomb{};               ///< likewise, N m
   double dead_zone = 0.0;             ///< of the integral: errors up to this are not integrated, rad
 
+  AngleSide controlled_side() const noexcept override { return AngleSide::kMotor; }
   std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
 };
 

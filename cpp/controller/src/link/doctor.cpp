@@ -132,7 +132,7 @@ LatencyHistogram measure_step(const Artifact& artifact, std::int64_t samples) {
 
 LatencyHistogram measure_round_trip(Link& plant, Link& controller, std::int64_t period_ns, std::int64_t samples) {
   return once_per_period(period_ns, samples, [&](std::int64_t k, std::int64_t /*tick*/) -> std::int64_t {
-    measurement_v2 measurement{};
+    measurement_v3 measurement{};
     measurement.seq = k;
     command_v2 command{};
     command.seq = k;

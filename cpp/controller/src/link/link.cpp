@@ -21,8 +21,10 @@ bool are_identical(const double (&a)[size], const double (&b)[size]) noexcept {
 }
 
 /// Whether two messages about one sample say the same; their time may differ.
-bool agree(const measurement_v2& a, const measurement_v2& b) noexcept {
-  return a.flags == b.flags && are_identical(a.angle_rad, b.angle_rad) && are_identical(a.speed_rad_s, b.speed_rad_s);
+bool agree(const measurement_v3& a, const measurement_v3& b) noexcept {
+  return a.available == b.available && are_identical(a.angle_rad, b.angle_rad) &&
+         are_identical(a.speed_rad_s, b.speed_rad_s) && are_identical(a.motor_angle_rad, b.motor_angle_rad) &&
+         are_identical(a.link_angle_rad, b.link_angle_rad) && are_identical(a.joint_torque_nm, b.joint_torque_nm);
 }
 bool agree(const command_v2& a, const command_v2& b) noexcept {
   return a.state == b.state && a.flags == b.flags && are_identical(a.torque_nm, b.torque_nm);
@@ -30,7 +32,7 @@ bool agree(const command_v2& a, const command_v2& b) noexcept {
 
 }  // namespace
 
-void Link::send(const measurement_v2& message) noexcept { seal_and_transmit(message); }
+void Link::send(const measurement_v3& message) noexcept { seal_and_transmit(message); }
 void Link::send(const command_v2& message) noexcept {
   const bool in_fault = message.state == static_cast<std::int32_t>(ControllerState::kFault);
   if (!in_fault || fault_seq_ < 0) {
@@ -39,7 +41,7 @@ void Link::send(const command_v2& message) noexcept {
   last_command_seq_ = message.seq;
   seal_and_transmit(message);
 }
-void Link::send(const telemetry_v1& message) noexcept { seal_and_transmit(message); }
+void Link::send(const telemetry_v2& message) noexcept { seal_and_transmit(message); }
 
 void Link::send(EventCode code, std::int64_t seq, std::int64_t detail, std::int64_t more) noexcept {
   event_v2 event{};
@@ -59,7 +61,7 @@ void Link::seal_and_transmit(Message message) noexcept {
   message.utime = monotonic_ns() / kNanosecondsPerMicrosecond;
   message.session = identity_.session;
   message.artifact_hash = identity_.artifact_hash;
-  if constexpr (!std::is_same_v<Message, telemetry_v1>) {
+  if constexpr (!std::is_same_v<Message, telemetry_v2>) {
     message.sender = sender_;
     message.mode = static_cast<std::int32_t>(identity_.pace);
     message.period_ns = identity_.period_ns;

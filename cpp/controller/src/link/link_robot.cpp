@@ -33,12 +33,13 @@ FaultCause cause_of(const event_v2& ended) noexcept {
 
 }  // namespace
 
-RobotReading to_reading(const measurement_v2& message) noexcept {
+RobotReading to_reading(const measurement_v3& message) noexcept {
   RobotReading reading;
   reading.seq = message.seq;
   reading.taken_ns = message.utime * kNanosecondsPerMicrosecond;
   std::copy(std::begin(message.angle_rad), std::end(message.angle_rad), reading.angle_rad.begin());
   std::copy(std::begin(message.speed_rad_s), std::end(message.speed_rad_s), reading.speed_rad_s.begin());
+  reading.gears = gears_of(message);
   return reading;
 }
 
@@ -52,7 +53,7 @@ command_v2 to_message(const RobotCommand& command) noexcept {
 }
 
 bool LinkRobot::read(RobotReading& reading, std::int64_t timeout_ns) noexcept {
-  measurement_v2 message;
+  measurement_v3 message;
   link_.receive(timeout_ns);
   if (!link_.take(message)) {
     return false;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <random>
 #include <type_traits>
 
@@ -44,6 +45,10 @@ bool joints_agree(const Message& message, const WireIdentity& identity) noexcept
   }
 }
 
+void copy(const double (&source)[kMaxJoints], JointArray& target) noexcept {
+  std::copy(std::begin(source), std::end(source), target.begin());
+}
+
 template <std::size_t Size>
 void copy(const std::array<double, Size>& source, double (&target)[Size]) noexcept {
   std::copy(source.begin(), source.end(), target);
@@ -53,7 +58,9 @@ constexpr bool is_within(std::int64_t value, std::int64_t low, std::int64_t high
   return low <= value && value <= high;
 }
 
-bool is_within_bounds(const measurement_v2& /*message*/) noexcept { return true; }
+bool is_within_bounds(const measurement_v3& message) noexcept {
+  return is_within(message.available, kNoGearSensor, kAllGearSensors);
+}
 bool is_within_bounds(const command_v2& message) noexcept {
   return is_within(message.state, static_cast<int>(ControllerState::kInit), static_cast<int>(ControllerState::kFault));
 }
@@ -72,7 +79,7 @@ bool has_times_within_bounds(const Message& message, std::int64_t period_ns) noe
 
 template <class Message>
 bool is_possible(const Message& message, const WireIdentity& identity) noexcept {
-  if constexpr (std::is_same_v<Message, telemetry_v1>) {
+  if constexpr (std::is_same_v<Message, telemetry_v2>) {
     return has_times_within_bounds(message, identity.period_ns);
   } else {
     return has_times_within_bounds(message, identity.period_ns) && is_within(message.period_ns, 0, kLongestTimeNs) &&
@@ -130,8 +137,24 @@ DecodeStatus decode(const void* bytes, std::size_t size, const WireIdentity& ide
   return DecodeStatus::kAccepted;
 }
 
-telemetry_v1 to_message(const TelemetrySample& sample) noexcept {
-  telemetry_v1 message{};
+GearReading gears_of(const measurement_v3& message) noexcept {
+  GearReading gears;
+  gears.available = static_cast<std::uint32_t>(message.available);
+  copy(message.motor_angle_rad, gears.motor_angle_rad);
+  copy(message.link_angle_rad, gears.link_angle_rad);
+  copy(message.joint_torque_nm, gears.joint_torque_nm);
+  return gears;
+}
+
+void set_gears(const GearReading& gears, measurement_v3& message) noexcept {
+  message.available = static_cast<std::int32_t>(gears.available);
+  copy(gears.motor_angle_rad, message.motor_angle_rad);
+  copy(gears.link_angle_rad, message.link_angle_rad);
+  copy(gears.joint_torque_nm, message.joint_torque_nm);
+}
+
+telemetry_v2 to_message(const TelemetrySample& sample) noexcept {
+  telemetry_v2 message{};
   message.seq = sample.seq;
   message.premises = sample.premises;
   message.state = static_cast<std::int32_t>(sample.state);
@@ -144,6 +167,10 @@ telemetry_v1 to_message(const TelemetrySample& sample) noexcept {
   copy(sample.reference_acceleration_rad_s2, message.reference_acceleration_rad_s2);
   copy(sample.measured_angle_rad, message.measured_angle_rad);
   copy(sample.measured_speed_rad_s, message.measured_speed_rad_s);
+  message.available = static_cast<std::int32_t>(sample.gears.available);
+  copy(sample.gears.motor_angle_rad, message.motor_angle_rad);
+  copy(sample.gears.link_angle_rad, message.link_angle_rad);
+  copy(sample.gears.joint_torque_nm, message.joint_torque_nm);
   copy(sample.estimated_angle_rad, message.estimated_angle_rad);
   copy(sample.estimated_speed_rad_s, message.estimated_speed_rad_s);
   copy(sample.estimated_disturbance, message.estimated_disturbance);
@@ -158,13 +185,13 @@ telemetry_v1 to_message(const TelemetrySample& sample) noexcept {
   return message;
 }
 
-template void encode(const measurement_v2&, Packet&) noexcept;
+template void encode(const measurement_v3&, Packet&) noexcept;
 template void encode(const command_v2&, Packet&) noexcept;
-template void encode(const telemetry_v1&, Packet&) noexcept;
+template void encode(const telemetry_v2&, Packet&) noexcept;
 template void encode(const event_v2&, Packet&) noexcept;
-template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, measurement_v2&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, measurement_v3&) noexcept;
 template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, command_v2&) noexcept;
-template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, telemetry_v1&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, telemetry_v2&) noexcept;
 template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, event_v2&) noexcept;
 
 }  // namespace quasilpv

@@ -1,6 +1,7 @@
 #include "quasilpv/telemetry_publisher.hpp"
 
 #include <chrono>
+#include <limits>
 #include <utility>
 
 #include "quasilpv/realtime.hpp"
@@ -69,10 +70,21 @@ void TelemetryPublisher::write_header() {
         "estimated_speed_rad_s", "estimated_disturbance", "filtered_disturbance", "integral_error_rad_s"}) {
     csv_->head(name, joints_);
   }
+  for (const char* name : {"measured_motor_angle_rad", "measured_link_angle_rad", "measured_joint_torque_nm"}) {
+    csv_->head(name, joints_);
+  }
   for (const char* name : {"membership_sum", "premise_excess", "lyapunov_rad2", "flags", "state", "step_ns"}) {
     csv_->head(name);
   }
   csv_->end_row();
+}
+
+void TelemetryPublisher::write_gears(const GearReading& gears) {
+  JointArray none;
+  none.fill(std::numeric_limits<double>::quiet_NaN());
+  csv_->add((gears.has(kMotorAngle) ? gears.motor_angle_rad : none).data(), joints_);
+  csv_->add((gears.has(kLinkAngle) ? gears.link_angle_rad : none).data(), joints_);
+  csv_->add((gears.has(kJointTorque) ? gears.joint_torque_nm : none).data(), joints_);
 }
 
 void TelemetryPublisher::write_row(const TelemetrySample& sample) {
@@ -85,6 +97,7 @@ void TelemetryPublisher::write_row(const TelemetrySample& sample) {
         &sample.estimated_disturbance, &sample.filtered_disturbance, &sample.integral_error_rad_s}) {
     csv_->add(values->data(), joints_);
   }
+  write_gears(sample.gears);
   for (const double value : {sample.membership_sum, sample.premise_excess, sample.lyapunov_rad2}) {
     csv_->add(value);
   }

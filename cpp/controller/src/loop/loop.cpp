@@ -49,7 +49,9 @@ void ControlLoop::handle(const RobotReading& reading, const SampleConditions& co
   input.seq = reading.seq;
   input.angle = reading.angle_rad;
   input.speed = reading.speed_rad_s;
-  input.valid = accept(reading);
+  input.gears = reading.gears;
+  controller_.choose_angle(input);
+  input.valid = accept(input);
   if (refusal_) {
     refuse_start(reading.seq, conditions.now_ns);
     return;
@@ -57,10 +59,11 @@ void ControlLoop::handle(const RobotReading& reading, const SampleConditions& co
   step(input, conditions, false);
 }
 
-bool ControlLoop::accept(const RobotReading& reading) noexcept {
-  const JointArray& angle = reading.angle_rad;
+bool ControlLoop::accept(const StepInput& reading) noexcept {
+  const JointArray& angle = reading.angle;
   implausible_ = false;
-  if (!std::all_of(angle.begin(), angle.begin() + joints(), [](double value) { return std::isfinite(value); })) {
+  if (!reading.valid ||
+      !std::all_of(angle.begin(), angle.begin() + joints(), [](double value) { return std::isfinite(value); })) {
     return false;
   }
   const bool follows = plausibility_.can_follow(reading.seq, angle);
@@ -71,7 +74,7 @@ bool ControlLoop::accept(const RobotReading& reading) noexcept {
   if (refusal && !plausibility_.has_accepted()) {
     refusal_ = refusal;
   }
-  const bool accepted = follows && !refusal && plausibility_.can_be_speed(reading.speed_rad_s);
+  const bool accepted = follows && !refusal && plausibility_.can_be_speed(reading.speed);
   // After a fault the arm moves while nobody controls it: the next reading is compared with this one, whatever it is.
   if (accepted || state() == ControllerState::kFault) {
     plausibility_.accept(reading.seq, angle);
@@ -250,6 +253,7 @@ void ControlLoop::write_telemetry(const StepInput& input, const StepReport& repo
   telemetry_.reference_acceleration_rad_s2 = on_path.acceleration;
   telemetry_.measured_angle_rad = input.angle;
   telemetry_.measured_speed_rad_s = input.speed;
+  telemetry_.gears = input.gears;
   telemetry_.estimated_angle_rad = report.estimated_angle;
   telemetry_.estimated_speed_rad_s = report.estimated_speed;
   telemetry_.estimated_disturbance = report.estimated_disturbance;

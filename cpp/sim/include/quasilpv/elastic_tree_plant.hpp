@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -24,7 +25,7 @@ struct ElasticTreeParameters {
   KinematicTree tree;                   ///< links only: its rotor inertias are 0
   std::vector<ElasticGear> gears;       ///< one per joint
   std::vector<JointFriction> friction;  ///< of the motors, one per joint
-  bool encoders_on_motors = true;       ///< false: on the links
+  std::uint32_t sensors = kMotorAngle;  ///< GearSensor bits; encoders on one side at least
 };
 
 /// The robot as a plant, y = (q, th, w, v): joint angles, motor angles reflected to the joints, and their rates.

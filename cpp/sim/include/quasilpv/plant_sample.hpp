@@ -1,6 +1,7 @@
 // What the actuated joints of a plant do at one instant.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "quasilpv/step.hpp"
@@ -9,10 +10,11 @@ namespace quasilpv {
 
 /// The motors behind gears that give, per joint, reflected to it.
 struct MotorSample {
-  JointArray angle{};             ///< rad
-  JointArray speed{};             ///< rad/s
-  JointArray acceleration{};      ///< rad/s^2, of the torque in force
-  bool carries_encoders = false;  ///< false: the encoders sit on the links
+  JointArray angle{};                     ///< rad
+  JointArray speed{};                     ///< rad/s
+  JointArray acceleration{};              ///< rad/s^2, of the torque in force
+  JointArray joint_torque{};              ///< N m, what the gears transmit
+  std::uint32_t sensors = kNoGearSensor;  ///< GearSensor bits: encoders on the motors, on the links, torque sensors
 };
 
 /// The truth at plant time t, which sensors blur and the controller never sees. Entries from the number of joints on
@@ -28,13 +30,12 @@ struct PlantSample {
   const JointArray& driven_speed() const noexcept { return motors ? motors->speed : speed; }
   const JointArray& driven_acceleration() const noexcept { return motors ? motors->acceleration : acceleration; }
 
+  /// Whether encoders sit on motors, be there others on the links or not.
+  bool carries_motor_encoders() const noexcept { return motors && (motors->sensors & kMotorAngle) != 0; }
+
   /// What encoders sit on: the motors if they carry them, else the joints.
-  const JointArray& encoder_angle() const noexcept {
-    return motors && motors->carries_encoders ? motors->angle : angle;
-  }
-  const JointArray& encoder_speed() const noexcept {
-    return motors && motors->carries_encoders ? motors->speed : speed;
-  }
+  const JointArray& encoder_angle() const noexcept { return carries_motor_encoders() ? motors->angle : angle; }
+  const JointArray& encoder_speed() const noexcept { return carries_motor_encoders() ? motors->speed : speed; }
 };
 
 }  // namespace quasilpv

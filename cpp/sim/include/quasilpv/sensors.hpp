@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <random>
 
+#include "quasilpv/plant_sample.hpp"
 #include "quasilpv/step.hpp"
 
 namespace quasilpv {
@@ -14,13 +16,17 @@ struct SensorOptions {
   double velocity_noise_rad_s = 0.0;  ///< standard deviation of the white noise on the measured speed
   std::uint64_t seed = 0;
   double velocity_filter_time_constant_s = 0.0;  ///< of the low-pass behind the noise, in the sensor; 0: none
+  /// Of encoders on the links, where motors have encoders too; nothing: `encoder_bits`.
+  std::optional<int> link_encoder_bits{};
 };
 
-/// Joint angles (rad) and speeds (rad/s) as measured at sample `seq`, plant time seq T.
+/// Joint angles (rad) and speeds (rad/s) as measured at sample `seq`, plant time seq T: those of the motors, of joints
+/// with encoders on both sides.
 struct Measurement {
   std::int64_t seq = 0;
   JointArray angle{};
   JointArray speed{};
+  GearReading gears{};
 };
 
 /// The multiple of `quantum` nearest to `angle` (ties away from zero); `quantum` = 0 returns `angle`.
@@ -42,20 +48,24 @@ class GaussianNoise {
   bool has_spare_ = false;
 };
 
-/// Encoders and noisy, filtered speeds of n joints: v = q v + (1 - q) (w + noise), q = exp(-T / time constant), from
-/// the first measured speed on. Every call to measure() draws new noise, so call it once per sample.
+/// Encoders, torque sensors (exact) and noisy, filtered speeds of n joints: v = q v + (1 - q) (w + noise), q = exp(-T /
+/// time constant), from the first measured speed on. Every call to measure() draws new noise, so call it once per
+/// sample.
 class Sensors {
  public:
   /// INIT-ONLY.
   Sensors(const SensorOptions& options, int joints, double sample_period_s);
 
-  Measurement measure(std::int64_t seq, const JointArray& angle, const JointArray& speed);
+  Measurement measure(std::int64_t seq, const PlantSample& truth);
 
   double angle_quantum_rad() const noexcept { return quantum_; }
 
  private:
+  void measure_gears(const PlantSample& truth, GearReading& gears) const noexcept;
+
   int joints_;
   double quantum_;
+  double link_quantum_;
   double velocity_noise_;
   double filter_pole_;
   GaussianNoise noise_;

@@ -21,7 +21,8 @@ struct RunRecord {
   Record samples;                      ///< `time_s`, then the columns of PlantColumns and StepColumns
 };
 
-/// One control step; any law that can be called.
+/// One control step; any law that can be called. Its input is the reading as it is, with the sensors of gears beside
+/// it.
 using StepFunction = std::function<StepReport(const StepInput&)>;
 /// Reference at plant time, s.
 using ReferenceFunction = std::function<Reference(double)>;

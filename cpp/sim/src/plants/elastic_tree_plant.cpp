@@ -26,16 +26,30 @@ Eigen::Map<const TreeVector> as_vector(const JointArray& values, int joints) noe
   return {values.data(), joints};
 }
 
+std::uint32_t read_sensors(const Field& plant) {
+  std::uint32_t sensors = kNoGearSensor;
+  const std::string side = plant["encoder_side"].text();
+  if (side == "motor" || side == "both") {
+    sensors |= kMotorAngle;
+  }
+  if (side == "link" || side == "both") {
+    sensors |= kLinkAngle;
+  }
+  if (sensors == kNoGearSensor) {
+    plant["encoder_side"].fail_choice({"motor", "link", "both"});
+  }
+  if (plant.has("torque_sensor") && plant["torque_sensor"].boolean()) {
+    sensors |= kJointTorque;
+  }
+  return sensors;
+}
+
 ElasticTreeParameters read_elastic_tree(const Field& field) {
-  field.only({"kind", "label", "gravity_m_s2", "encoder_side", "joints", "tool"});
+  field.only({"kind", "label", "gravity_m_s2", "encoder_side", "torque_sensor", "joints", "tool"});
   ElasticTreeParameters parameters;
   parameters.label = field["label"].text();
   parameters.tree = read_tree(field);
-  const std::string side = field["encoder_side"].text();
-  if (side != "motor" && side != "link") {
-    field["encoder_side"].fail("\"" + side + "\"", "\"motor\" or \"link\"");
-  }
-  parameters.encoders_on_motors = side == "motor";
+  parameters.sensors = read_sensors(field);
   const Field joints = field["joints"];
   for (std::size_t k = 0; k < joints.size(); ++k) {
     const Field joint = joints.at(k);
@@ -160,7 +174,7 @@ PlantSample ElasticTreePlant::sample(double t, ConstVector y) const {
   PlantSample sample{joint_array(y.head(n)), joint_array(y.segment(2 * n, n)), joint_array(y_dot.segment(2 * n, n)),
                      external_torque().at(t)};
   sample.motors = MotorSample{joint_array(y.segment(n, n)), joint_array(y.tail(n)), joint_array(y_dot.tail(n)),
-                              parameters_.encoders_on_motors};
+                              joint_array(spring_torque(y)), parameters_.sensors};
   return sample;
 }
 

@@ -140,10 +140,11 @@ void LossyRobot::begin_sample() {
   torque_ = session_.torque();
   delay_ns_ = 0;
   const Measurement& measured = session_.measure(session_.seq());
-  measurement_v2 message{};
+  measurement_v3 message{};
   message.seq = measured.seq;
   std::copy(measured.angle.begin(), measured.angle.end(), message.angle_rad);
   std::copy(measured.speed.begin(), measured.speed.end(), message.speed_rad_s);
+  set_gears(measured.gears, message);
   plant_->send(message);
 }
 

@@ -36,7 +36,7 @@ class RunColumns {
       : record_(record),
         seq_(record.add_column("seq")),
         time_(record.add_column("time_s")),
-        plant_(record, session.joints()),
+        plant_(record, session.joints(), session.truth().motors.has_value()),
         torque_(record.add_column("torque_nm", static_cast<std::size_t>(session.joints()))),
         delay_(record.add_column("command_delay_s")) {
     record.reserve(static_cast<std::size_t>(session.samples()));
@@ -107,10 +107,11 @@ class PlantRun {
 
   void send_measurement() {
     const Measurement& measured = session_.measure(session_.seq());
-    measurement_v2 message{};
+    measurement_v3 message{};
     message.seq = measured.seq;
     std::copy(measured.angle.begin(), measured.angle.end(), message.angle_rad);
     std::copy(measured.speed.begin(), measured.speed.end(), message.speed_rad_s);
+    set_gears(measured.gears, message);
     sent_ns_ = monotonic_ns();
     link_.send(message);
   }

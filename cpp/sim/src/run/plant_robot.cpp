@@ -11,7 +11,7 @@ bool PlantRobot::read(RobotReading& reading, std::int64_t /*timeout_ns*/) noexce
   }
   last_read_ = session_.seq();
   const Measurement& measured = session_.measure(last_read_);
-  reading = {measured.seq, monotonic_ns(), measured.angle, measured.speed};
+  reading = {measured.seq, monotonic_ns(), measured.angle, measured.speed, measured.gears};
   return true;
 }
 

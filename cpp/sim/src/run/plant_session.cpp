@@ -51,7 +51,7 @@ void PlantSession::expect_current(std::int64_t k) const {
 // Truth and measurement at the end of an interval, under the torque that acted on it.
 void PlantSession::observe(double time_s) {
   truth_ = plant_->sample(time_s, state_);
-  measurement_ = sensors_.measure(seq_, truth_.encoder_angle(), truth_.encoder_speed());
+  measurement_ = sensors_.measure(seq_, truth_);
 }
 
 const Measurement& PlantSession::measure(std::int64_t k) const {

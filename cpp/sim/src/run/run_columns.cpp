@@ -2,12 +2,16 @@
 
 namespace quasilpv {
 
-PlantColumns::PlantColumns(Record& record, int joints) : record_(record) {
+PlantColumns::PlantColumns(Record& record, int joints, bool has_gears) : record_(record), has_gears_(has_gears) {
   const auto width = static_cast<std::size_t>(joints);
   angle_ = record.add_column("angle_rad", width);
   speed_ = record.add_column("speed_rad_s", width);
   acceleration_ = record.add_column("acceleration_rad_s2", width);
   external_torque_ = record.add_column("external_torque_nm", width);
+  if (has_gears_) {
+    motor_angle_ = record.add_column("motor_angle_rad", width);
+    joint_torque_ = record.add_column("joint_torque_nm", width);
+  }
 }
 
 void PlantColumns::append(const PlantSample& sample) {
@@ -15,9 +19,13 @@ void PlantColumns::append(const PlantSample& sample) {
   record_.append(speed_, sample.speed);
   record_.append(acceleration_, sample.acceleration);
   record_.append(external_torque_, sample.external_torque);
+  if (has_gears_) {
+    record_.append(motor_angle_, sample.motors->angle);
+    record_.append(joint_torque_, sample.motors->joint_torque);
+  }
 }
 
-StepColumns::StepColumns(Record& record, int joints) : record_(record) {
+StepColumns::StepColumns(Record& record, int joints, std::uint32_t sensors) : record_(record), sensors_(sensors) {
   const auto width = static_cast<std::size_t>(joints);
   measured_angle_ = record.add_column("measured_angle_rad", width);
   measured_speed_ = record.add_column("measured_speed_rad_s", width);
@@ -32,9 +40,22 @@ StepColumns::StepColumns(Record& record, int joints) : record_(record) {
   filtered_disturbance_ = record.add_column("filtered_disturbance", width);
   integral_error_ = record.add_column("integral_error_rad_s", width);
   flags_ = record.add_column("flags");
+  if (sensors_ != kNoGearSensor) {
+    encoder_angle_ = record.add_column("encoder_angle_rad", width);
+    available_ = record.add_column("available");
+  }
+  if ((sensors_ & kMotorAngle) != 0) {
+    motor_angle_ = record.add_column("measured_motor_angle_rad", width);
+  }
+  if ((sensors_ & kLinkAngle) != 0) {
+    link_angle_ = record.add_column("measured_link_angle_rad", width);
+  }
+  if ((sensors_ & kJointTorque) != 0) {
+    joint_torque_ = record.add_column("measured_joint_torque_nm", width);
+  }
 }
 
-void StepColumns::append(const StepInput& input, const StepReport& report) {
+void StepColumns::append(const StepInput& input, const JointArray& encoder_angle, const StepReport& report) {
   record_.append(measured_angle_, input.angle);
   record_.append(measured_speed_, input.speed);
   record_.append(reference_angle_, input.reference.angle);
@@ -48,6 +69,19 @@ void StepColumns::append(const StepInput& input, const StepReport& report) {
   record_.append(filtered_disturbance_, report.filtered_disturbance);
   record_.append(integral_error_, report.integral_error);
   record_.append(flags_, static_cast<double>(report.flags));
+  if (sensors_ != kNoGearSensor) {
+    record_.append(encoder_angle_, encoder_angle);
+    record_.append(available_, static_cast<double>(input.gears.available));
+  }
+  if ((sensors_ & kMotorAngle) != 0) {
+    record_.append(motor_angle_, input.gears.motor_angle_rad);
+  }
+  if ((sensors_ & kLinkAngle) != 0) {
+    record_.append(link_angle_, input.gears.link_angle_rad);
+  }
+  if ((sensors_ & kJointTorque) != 0) {
+    record_.append(joint_torque_, input.gears.joint_torque_nm);
+  }
 }
 
 MonitorColumns::MonitorColumns(Record& record) : record_(record) {

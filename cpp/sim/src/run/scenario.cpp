@@ -85,13 +85,16 @@ std::vector<SineTorque> external_torque(const Field& field, int joints) {
 }
 
 SensorOptions sensors(const Field& field) {
-  field.only({"encoder_bits", "velocity_noise_rad_s", "seed", "velocity_filter_time_constant_s"});
+  field.only({"encoder_bits", "velocity_noise_rad_s", "seed", "velocity_filter_time_constant_s", "link_encoder_bits"});
   SensorOptions options;
   options.encoder_bits = static_cast<int>(field["encoder_bits"].integer(0, kMaxEncoderBits));
   options.velocity_noise_rad_s = field["velocity_noise_rad_s"].non_negative();
   options.seed = static_cast<std::uint64_t>(field["seed"].integer(0, kMaxSeed));
   if (field.has("velocity_filter_time_constant_s")) {
     options.velocity_filter_time_constant_s = field["velocity_filter_time_constant_s"].non_negative();
+  }
+  if (field.has("link_encoder_bits") && !field["link_encoder_bits"].is_null()) {
+    options.link_encoder_bits = static_cast<int>(field["link_encoder_bits"].integer(0, kMaxEncoderBits));
   }
   return options;
 }

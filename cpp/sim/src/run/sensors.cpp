@@ -7,6 +7,8 @@ namespace {
 
 constexpr double kTwoPi = 6.283185307179586476925286766559;
 
+double quantum(int bits) { return bits > 0 ? std::ldexp(kTwoPi, -bits) : 0.0; }
+
 }  // namespace
 
 double quantise(double angle, double quantum) noexcept {
@@ -29,14 +31,17 @@ double GaussianNoise::operator()() {
 
 Sensors::Sensors(const SensorOptions& options, int joints, double sample_period_s)
     : joints_(joints),
-      quantum_(options.encoder_bits > 0 ? std::ldexp(kTwoPi, -options.encoder_bits) : 0.0),
+      quantum_(quantum(options.encoder_bits)),
+      link_quantum_(quantum(options.link_encoder_bits.value_or(options.encoder_bits))),
       velocity_noise_(options.velocity_noise_rad_s),
       filter_pole_(options.velocity_filter_time_constant_s > 0.0
                        ? std::exp(-sample_period_s / options.velocity_filter_time_constant_s)
                        : 0.0),
       noise_(options.seed) {}
 
-Measurement Sensors::measure(std::int64_t seq, const JointArray& angle, const JointArray& speed) {
+Measurement Sensors::measure(std::int64_t seq, const PlantSample& truth) {
+  const JointArray& angle = truth.encoder_angle();
+  const JointArray& speed = truth.encoder_speed();
   Measurement measurement;
   measurement.seq = seq;
   for (std::size_t j = 0; j < static_cast<std::size_t>(joints_); ++j) {
@@ -46,7 +51,21 @@ Measurement Sensors::measure(std::int64_t seq, const JointArray& angle, const Jo
     measurement.speed[j] = filtered_speed_[j];
   }
   started_ = true;
+  measure_gears(truth, measurement.gears);
   return measurement;
+}
+
+void Sensors::measure_gears(const PlantSample& truth, GearReading& gears) const noexcept {
+  if (!truth.motors) {
+    return;
+  }
+  gears.available = truth.motors->sensors;
+  const double link_quantum = gears.has(kMotorAngle) ? link_quantum_ : quantum_;
+  for (std::size_t j = 0; j < static_cast<std::size_t>(joints_); ++j) {
+    gears.motor_angle_rad[j] = gears.has(kMotorAngle) ? quantise(truth.motors->angle[j], quantum_) : 0.0;
+    gears.link_angle_rad[j] = gears.has(kLinkAngle) ? quantise(truth.angle[j], link_quantum) : 0.0;
+    gears.joint_torque_nm[j] = gears.has(kJointTorque) ? truth.motors->joint_torque[j] : 0.0;
+  }
 }
 
 }  // namespace quasilpv

@@ -102,7 +102,8 @@ class ElasticTreePlant(MechanismDocument, _Labelled):
     """A robot in space with elastic joints: motors and links move on their own.
 
     Attributes:
-        encoder_side: what the encoders sit on.
+        encoder_side: what the encoders sit on; of both, the angle of a reading is the motor's.
+        torque_sensor: whether the torque in the joints is measured.
         tool: as of a `TreePlant`.
     """
 
@@ -110,7 +111,8 @@ class ElasticTreePlant(MechanismDocument, _Labelled):
 
     kind: Literal["elastic-tree"] = "elastic-tree"
     gravity_m_s2: Row
-    encoder_side: Literal["motor", "link"]
+    encoder_side: Literal["motor", "link", "both"]
+    torque_sensor: bool = False
     chain: Annotated[tuple[ElasticJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
     tool: ToolFrame | None = None
 

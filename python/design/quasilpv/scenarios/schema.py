@@ -18,7 +18,7 @@ from quasilpv.documents.canonical import (
     require_bounded,
 )
 from quasilpv.documents.mechanism import MECHANISM_KINDS
-from quasilpv.documents.plants import ElasticTreePlant, Plant, TreePlant
+from quasilpv.documents.plants import Plant, TreePlant
 from quasilpv.documents.strict_model import LARGEST_NUMBER, FieldError, NonNegative, Positive, StrictModel, validate
 from quasilpv.errors import InputError
 from quasilpv.files import read_bytes, write_readable_json
@@ -69,12 +69,17 @@ class SineTorque(StrictModel):
 
 
 class Sensors(StrictModel):
-    """Encoder resolution (0 bits: exact), standard deviation of the speed noise, its seed, and the filter behind it."""
+    """Encoder resolution (0 bits: exact), standard deviation of the speed noise, its seed, and the filter behind it.
+
+    Attributes:
+        link_encoder_bits: of encoders on the links, where motors have encoders too; None: as the others.
+    """
 
     encoder_bits: int = Field(default=ENCODER_BITS, ge=0, le=32)
     velocity_noise_rad_s: NonNegative = VELOCITY_NOISE_RAD_S
     seed: int = Field(default=NOISE_SEED, ge=0, le=MAX_SAFE_INTEGER)
     velocity_filter_time_constant_s: NonNegative = 0.0
+    link_encoder_bits: int | None = Field(default=None, ge=0, le=32)
 
 
 class InitialState(StrictModel):
@@ -90,8 +95,15 @@ TAGS = (*MECHANISM_KINDS, "ida", "rk4", "mujoco")
 """The kinds that tell the cases of a union apart."""
 
 
-OPTIONAL = frozenset({"torque_limit_nm", "sensors.velocity_filter_time_constant_s", "plant.lag_s", "plant.tool"})
-"""Members a scenario file may leave out, as files written before they were there do."""
+OPTIONAL: Mapping[str, object] = {
+    "torque_limit_nm": None,
+    "sensors.velocity_filter_time_constant_s": 0.0,
+    "sensors.link_encoder_bits": None,
+    "plant.lag_s": 0.0,
+    "plant.torque_sensor": False,
+    "plant.tool": None,
+}
+"""Members a scenario file may leave out, as files written before they were there do; and what that says."""
 
 
 def sine_torques(*terms: tuple[float, float]) -> tuple[SineTorque, ...]:
@@ -147,14 +159,11 @@ class Scenario(StrictModel):
     def to_document(self) -> Document:
         """Return the scenario as a normalised JSON tree; members of `OPTIONAL` that say nothing are left out."""
         document: Document = normalise(self.model_dump(mode="json", by_alias=True), self.name)
-        if self.torque_limit_nm is None:
-            del document["torque_limit_nm"]
-        if isinstance(self.plant, TreePlant | ElasticTreePlant) and self.plant.tool is None:
-            del document["plant"]["tool"]
-        if not self.sensors.velocity_filter_time_constant_s:
-            del document["sensors"]["velocity_filter_time_constant_s"]
-        if isinstance(self.plant, TreePlant) and not self.plant.lag_s:
-            del document["plant"]["lag_s"]
+        for path, unsaid in OPTIONAL.items():
+            *place, name = path.split(".")
+            holder = document[place[0]] if place else document
+            if name in holder and holder[name] == unsaid:
+                del holder[name]
         return document
 
     @classmethod

@@ -35,6 +35,9 @@ TORQUE_SATURATED, SLEW_LIMITED = 1 << 2, 1 << 3
 AT_LIMIT = TORQUE_SATURATED | SLEW_LIMITED
 """Bits of the flags of a step in which a limit acted."""
 
+GEAR_SENSORS = {"motor_angle_rad": 1 << 0, "link_angle_rad": 1 << 1, "joint_torque_nm": 1 << 2}
+"""Bits of ``available`` in measurements and telemetry, by the member that means something with it."""
+
 
 def word(words: Sequence[str], code: int) -> str:
     """The word of a code, or the code itself if it has none."""

@@ -22,11 +22,11 @@ Records: TypeAlias = npt.NDArray[Any]
 """A structured array, one record per message, with the members of its type and ``fingerprint`` before them."""
 
 CHANNELS = {
-    "QLPV_MEASUREMENT": ("measurement_v2", "measurement_v1"),
+    "QLPV_MEASUREMENT": ("measurement_v3", "measurement_v2", "measurement_v1"),
     "QLPV_COMMAND": ("command_v2", "command_v1"),
-    "QLPV_TELEMETRY": ("telemetry_v1",),
+    "QLPV_TELEMETRY": ("telemetry_v2", "telemetry_v1"),
     "QLPV_EVENT": ("event_v2", "event_v1"),
-    "QLPV_TRUTH": ("truth_v1",),
+    "QLPV_TRUTH": ("truth_v2", "truth_v1"),
 }
 """Types of the messages on each channel: the one that is sent, and before it those that logs may hold."""
 

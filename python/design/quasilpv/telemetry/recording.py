@@ -45,6 +45,19 @@ _MEMBERS = {
 }
 """Which column each member of a message holds."""
 
+_MEASURED = {
+    "motor_angle_rad": "measured_motor_angle_rad",
+    "link_angle_rad": "measured_link_angle_rad",
+    "joint_torque_nm": "measured_joint_torque_nm",
+}
+_GEARS = {
+    "QLPV_MEASUREMENT": {"angle_rad": "encoder_angle_rad"} | _MEASURED,
+    "QLPV_COMMAND": {},
+    "QLPV_TELEMETRY": _MEASURED,
+    "QLPV_TRUTH": {name: name for name in ("motor_angle_rad", "joint_torque_nm")},
+}
+"""The same of columns that only robots with gears that give have."""
+
 _MONITOR = ("membership_sum", "premise_excess", "lyapunov_rad2")
 
 
@@ -92,6 +105,9 @@ def write_run(path: Path, documents: RunDocuments, columns: Columns) -> Path:
     known = {**columns, "torque_nm": columns["torque_applied_nm"]}
     streams = {channel: messages(channel, artifact, seq, known) for channel in _MEMBERS}
     telemetry = streams["QLPV_TELEMETRY"]
+    if "available" in columns:
+        for records in (streams["QLPV_MEASUREMENT"], telemetry):
+            records["available"] = columns["available"]
     for records in (streams["QLPV_COMMAND"], telemetry):
         records["flags"] = columns["flags"]
         records["state"] = RUNNING
@@ -112,7 +128,8 @@ def messages(
         channel: of those that come once per sample.
         artifact: the controller.
         seq: (N,) numbers of the samples.
-        columns: what the messages are about; `QLPV_TRUTH` takes the plant's ``torque_nm``.
+        columns: what the messages are about; `QLPV_TRUTH` takes the plant's ``torque_nm``, and is NaN where a robot
+            has no motors of their own.
         session: of the run.
     """
     records = channel_type(channel).new(seq.size)
@@ -120,7 +137,11 @@ def messages(
     _introduce(records, artifact)
     records["seq"], records["session"], records["joints"] = seq, session, artifact.joints
     records["artifact_hash"] = hash_prefix(artifact.hash)
-    for member, column in _MEMBERS[channel].items():
+    if channel == "QLPV_TRUTH":
+        for member in _GEARS[channel]:
+            records[member][:, : artifact.joints] = np.nan
+    held = _MEMBERS[channel] | {member: column for member, column in _GEARS[channel].items() if column in columns}
+    for member, column in held.items():
         records[member][:, : artifact.joints] = columns[column].reshape(seq.size, artifact.joints)
     return records
 
@@ -133,7 +154,7 @@ def _introduce(records: Records, artifact: Artifact) -> None:
 
 
 def columns_of(channel: str, records: Records, joints: int) -> dict[str, FloatArray]:
-    """The columns that messages of a channel hold, (N, n): the inverse of `messages`.
+    """The columns that messages of a channel hold, (N, n): the inverse of `messages`, without those of gears.
 
     Args:
         channel: of those that come once per sample.

@@ -11,7 +11,7 @@ from quasilpv import _runtime
 from quasilpv.arrays import FloatArray
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
-from quasilpv.telemetry.codes import FAULT
+from quasilpv.telemetry.codes import FAULT, GEAR_SENSORS
 from quasilpv.telemetry.log import RunLog
 
 
@@ -49,11 +49,12 @@ def replay(log: RunLog) -> Replay:
     controller, n = _runtime.Controller(runtime), artifact.joints
     measured, commands = _measured(log), {int(c["seq"]): c for c in log["command"].samples}
     compared, difference = 0, None
-    for k, (angle, speed) in enumerate(measured):
+    for k, reading in enumerate(measured):
         command = commands.get(k)
         if command is not None and command["state"] == FAULT:  # it no longer commands what its law says
             return Replay(k, compared, difference, k)
-        report = controller.step(angle[:n], *trajectory.evaluate(k * artifact.sample_period_s), speed[:n], seq=k)
+        r = trajectory.evaluate(k * artifact.sample_period_s)
+        report = controller.step(reading.angle[:n], *r, reading.speed[:n], seq=k, gears=reading.gears(n))
         if command is None:
             continue
         compared += 1
@@ -71,10 +72,33 @@ def _difference(k: int, torque: FloatArray, command: Any) -> str | None:
     return f"sample {k}, joint {joint + 1}: {float(logged[joint])!r} N m in the log, {float(torque[joint])!r} replayed"
 
 
-def _measured(log: RunLog) -> list[tuple[FloatArray, FloatArray]]:
-    """Angles and speeds of every sample from 0 to the last."""
+@dataclass(frozen=True, eq=False)
+class _Reading:
+    """One message with what was measured: of its type, the members that it has."""
+
+    record: Any
+    prefix: str
+
+    @property
+    def angle(self) -> FloatArray:
+        return np.asarray(self.record[f"{self.prefix}angle_rad"])
+
+    @property
+    def speed(self) -> FloatArray:
+        return np.asarray(self.record[f"{self.prefix}speed_rad_s"])
+
+    def gears(self, joints: int) -> dict[str, FloatArray]:
+        """What was available of the gears' sensors; nothing in logs from before there were any."""
+        if "available" not in self.record.dtype.names:
+            return {}
+        there = int(self.record["available"])
+        return {name: np.asarray(self.record[name][:joints]) for name, bit in GEAR_SENSORS.items() if there & bit}
+
+
+def _measured(log: RunLog) -> list[_Reading]:
+    """What was measured in every sample from 0 to the last."""
     found = {
-        int(record["seq"]): (record[f"{prefix}angle_rad"], record[f"{prefix}speed_rad_s"])
+        int(record["seq"]): _Reading(record, prefix)
         for channel, prefix in (("telemetry", "measured_"), ("measurement", ""))
         for record in log[channel].samples
     }

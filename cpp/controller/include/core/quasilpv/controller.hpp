@@ -19,6 +19,11 @@ class Controller {
   Controller(Controller&&) noexcept;
   Controller& operator=(Controller&&) noexcept;
 
+  /// Puts the angles that the law controls, those of its side, in the place of `input.angle`, and leaves out sensors
+  /// of gears that failed. Without an encoder on that side the input is not valid. To be done before step(). RT-SAFE
+  /// (bounded, no allocation, no lock, no throw).
+  void choose_angle(StepInput& input) const noexcept;
+
   /// One sample, in the order of the law's own documentation. RT-SAFE (bounded, no allocation, no lock, no throw).
   StepReport step(const StepInput& input) noexcept;
 
@@ -35,6 +40,7 @@ class Controller {
   std::unique_ptr<ControlLaw> law_;
   double sample_period_s_;
   int joints_;
+  AngleSide side_;
 };
 
 }  // namespace quasilpv

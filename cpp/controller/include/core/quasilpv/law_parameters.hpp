@@ -60,6 +60,8 @@ class LawParameters {
 
   /// Whether the law reads measured speeds.
   virtual bool reads_speed() const noexcept = 0;
+  /// Which angles the law controls. A law with a side reads no speeds: those of a reading are of `angle_rad`.
+  virtual AngleSide controlled_side() const noexcept { return AngleSide::kJoint; }
   /// The Coriolis torque that the law feeds forward, as the law defines it; null: none.
   virtual const Program* coriolis() const noexcept { return nullptr; }
   /// What the monitor watches; null: the law was not designed for one.

@@ -43,7 +43,8 @@ struct SampleConditions {
 ///
 /// 1. for every sample missing since the last one, a step without measurement (the observer predicts with the torque
 ///    that the robot held); at most `invalid_limit` of them, because so many latch a fault anyway;
-/// 2. is the reading plausible? If not, it counts like a missing one; if it is the first, the start is refused;
+/// 2. which angles does the law control, and are they plausible? If not, it counts like a missing one; if it is the
+/// first, the start is refused;
 /// 3. reference r(k T), control step, fail-safe policy; in Fault the safe torque replaces the law's.
 ///
 /// A bumpless start takes two valid readings, because one does not tell the speed. At the first, y_0, the law is told
@@ -112,7 +113,7 @@ class ControlLoop {
   Reference path(std::int64_t seq) const noexcept {
     return trajectory_.evaluate(static_cast<double>(seq) * sample_period_s());
   }
-  bool accept(const RobotReading& reading) noexcept;
+  bool accept(const StepInput& reading) noexcept;
   void refuse_start(std::int64_t seq, std::int64_t now_ns) noexcept;
   void advance_start(StepInput& input) noexcept;
   void join(const StepInput& input) noexcept;

@@ -14,6 +14,7 @@ struct RobotReading {
   std::int64_t taken_ns = 0;  ///< monotonic_ns() of the measurement
   JointArray angle_rad{};     ///< NaN marks an encoder that failed: the observer then predicts
   JointArray speed_rad_s{};   ///< read only by laws that need a measured speed; 0 otherwise
+  GearReading gears{};        ///< motor_angle_rad, link_angle_rad, joint_torque_nm, as far as there are sensors
 };
 
 /// What a robot shall do from now on.

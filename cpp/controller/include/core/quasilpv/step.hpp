@@ -4,13 +4,11 @@
 #include <array>
 #include <cstdint>
 
+#include "quasilpv/gear_reading.hpp"
+
 namespace quasilpv {
 
-inline constexpr int kMaxJoints = 7;
 inline constexpr int kMaxPremises = 32;
-
-/// One value per joint; entries from the number of joints on are zero.
-using JointArray = std::array<double, kMaxJoints>;
 
 /// Interval of one joint.
 struct Interval {
@@ -30,9 +28,10 @@ struct StepInput {
   std::int64_t seq = 0;
   bool valid = true;      ///< false: no usable measurement; the observer predicts and the step uses its prediction
   bool commanded = true;  ///< false: the torque of this step reaches nobody, the plant holds the last one
-  JointArray angle{};
+  JointArray angle{};     ///< what the law controls; see Controller::choose_angle()
   JointArray speed{};
   Reference reference{};
+  GearReading gears{};   ///< what else is measured of joints that give
   bool joining = false;  ///< the reference is off its path by `offset` (JoiningSegment)
   Reference offset{};
 };

@@ -10,7 +10,7 @@
 
 namespace quasilpv {
 
-/// One sample of a run. `quasilpv::link` sends it as `telemetry_v1` (docs/reference/messages.md).
+/// One sample of a run. `quasilpv::link` sends it as `telemetry_v2` (docs/reference/messages.md).
 struct TelemetrySample {
   std::int64_t seq = 0;
   ControllerState state = ControllerState::kInit;
@@ -22,8 +22,9 @@ struct TelemetrySample {
   JointArray reference_angle_rad{};    ///< of the path, without what a joining segment adds
   JointArray reference_speed_rad_s{};
   JointArray reference_acceleration_rad_s2{};
-  JointArray measured_angle_rad{};
+  JointArray measured_angle_rad{};  ///< what the law controls
   JointArray measured_speed_rad_s{};
+  GearReading gears{};
   JointArray estimated_angle_rad{};
   JointArray estimated_speed_rad_s{};
   JointArray estimated_disturbance{};

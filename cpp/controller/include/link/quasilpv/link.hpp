@@ -53,9 +53,9 @@ class Link {
 
   /// Fills in what all messages have in common, in a copy of the message, and hands it to the transport; a failure is
   /// counted. RT-UNSAFE (system call); allocates nothing itself and never throws.
-  void send(const measurement_v2& message) noexcept;
+  void send(const measurement_v3& message) noexcept;
   void send(const command_v2& message) noexcept;
-  void send(const telemetry_v1& message) noexcept;
+  void send(const telemetry_v2& message) noexcept;
   void send(const TelemetrySample& sample) noexcept { send(to_message(sample)); }
   void send(EventCode code, std::int64_t seq, std::int64_t detail = 0, std::int64_t more = 0) noexcept;
 
@@ -65,7 +65,7 @@ class Link {
 
   /// Takes the newest message out, true if there is one that was not taken yet. A duplicate of the newest message can
   /// be taken again: lock-step answers it. RT-SAFE.
-  bool take(measurement_v2& message) noexcept { return measurement_.take(message); }
+  bool take(measurement_v3& message) noexcept { return measurement_.take(message); }
   bool take(command_v2& message) noexcept { return command_.take(message); }
 
   /// Takes the oldest event out: each of them counts, so they are kept in order, at most 8. RT-SAFE.
@@ -152,7 +152,7 @@ class Link {
   std::optional<std::int64_t> foreign_session_;
   LinkCounters counters_;
   std::int64_t longest_wrong_run_ = 0;
-  Inbox<measurement_v2> measurement_;
+  Inbox<measurement_v3> measurement_;
   Inbox<command_v2> command_;
   EventQueue events_;
   std::int64_t last_command_seq_ = -1;  // sent

@@ -29,7 +29,7 @@ class LinkRobot final : public Robot {
 };
 
 /// The reading in a message. RT-SAFE (bounded, no allocation, no lock, no throw), as the next.
-RobotReading to_reading(const measurement_v2& message) noexcept;
+RobotReading to_reading(const measurement_v3& message) noexcept;
 
 /// The message of a command; Link::send() fills in the rest.
 command_v2 to_message(const RobotCommand& command) noexcept;

@@ -8,11 +8,11 @@
 
 #include "quasilpv/command_v2.hpp"
 #include "quasilpv/event_v2.hpp"
-#include "quasilpv/measurement_v2.hpp"
+#include "quasilpv/measurement_v3.hpp"
 #include "quasilpv/pacer.hpp"
 #include "quasilpv/step.hpp"
 #include "quasilpv/telemetry_sample.hpp"
-#include "quasilpv/telemetry_v1.hpp"
+#include "quasilpv/telemetry_v2.hpp"
 
 namespace quasilpv {
 
@@ -26,9 +26,9 @@ inline constexpr int kChannels = 4;
 const char* channel_name(Channel channel) noexcept;
 
 /// Channel a message type travels on.
-constexpr Channel channel_of(const measurement_v2& /*type*/) noexcept { return Channel::kMeasurement; }
+constexpr Channel channel_of(const measurement_v3& /*type*/) noexcept { return Channel::kMeasurement; }
 constexpr Channel channel_of(const command_v2& /*type*/) noexcept { return Channel::kCommand; }
-constexpr Channel channel_of(const telemetry_v1& /*type*/) noexcept { return Channel::kTelemetry; }
+constexpr Channel channel_of(const telemetry_v2& /*type*/) noexcept { return Channel::kTelemetry; }
 constexpr Channel channel_of(const event_v2& /*type*/) noexcept { return Channel::kEvent; }
 
 /// Who sent an event (`event_v2::source`).
@@ -63,8 +63,12 @@ std::int64_t new_sender();
 /// The process id in the name of a sender. RT-SAFE.
 constexpr std::int64_t process_of(std::int64_t sender) noexcept { return sender & 0x3FFFFF; }
 
+/// What a message says of the gears, and the other way round. RT-SAFE.
+GearReading gears_of(const measurement_v3& message) noexcept;
+void set_gears(const GearReading& gears, measurement_v3& message) noexcept;
+
 /// The sample as it is sent; who sends it fills in the rest. RT-SAFE.
-telemetry_v1 to_message(const TelemetrySample& sample) noexcept;
+telemetry_v2 to_message(const TelemetrySample& sample) noexcept;
 
 /// Outcome of decoding one packet.
 enum class DecodeStatus : std::uint8_t {

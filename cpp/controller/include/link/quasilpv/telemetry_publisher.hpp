@@ -49,6 +49,7 @@ class TelemetryPublisher {
   void run();
   void drain();
   void write_header();
+  void write_gears(const GearReading& gears);
   void write_row(const TelemetrySample& sample);
 
   std::unique_ptr<Link> link_;

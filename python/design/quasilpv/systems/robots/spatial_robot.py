@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from math import isfinite, sqrt
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -230,9 +230,14 @@ class SpatialRobot:
         # The gears that are simulated are in the middle of their interval, with the least damping.
         stiffness = tuple(sqrt(drive.stiffness_nm_rad[0] * drive.stiffness_nm_rad[1]) for drive in drives)
         damping = tuple(drive.damping_least_s * pull for drive, pull in zip(drives, stiffness, strict=True))
-        side: Literal["motor", "link"] = "link" if drives[0].encoder_side == "link" else "motor"
         return ElasticMechanism(
-            tree, viscous, coulomb, stiffness_nm_rad=stiffness, damping_nm_s=damping, encoder_side=side
+            tree,
+            viscous,
+            coulomb,
+            stiffness_nm_rad=stiffness,
+            damping_nm_s=damping,
+            encoder_side=drives[0].encoder_side,
+            torque_sensor=all(drive.torque_sensor for drive in drives),
         )
 
     @property

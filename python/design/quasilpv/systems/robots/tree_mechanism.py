@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from quasilpv.arrays import FloatArray
 from quasilpv.systems.robots.drawing import Drawing
+from quasilpv.systems.robots.joint_drive import EncoderSide
 from quasilpv.systems.robots.tree import KinematicTree
 
 COULOMB_SPEED_RAD_S = 0.01
@@ -99,15 +100,18 @@ class ElasticMechanism(TreeMechanism):
     Attributes:
         stiffness_nm_rad, damping_nm_s: of the gears, (n,).
         encoder_side: what the encoders sit on.
+        torque_sensor: whether the torque in the joints is measured.
     """
 
     stiffness_nm_rad: tuple[float, ...] = ()
     damping_nm_s: tuple[float, ...] = ()
-    encoder_side: Literal["motor", "link"] = "motor"
+    encoder_side: EncoderSide = "motor"
+    torque_sensor: bool = False
 
     def plant_document(self, label: str) -> dict[str, Any]:
         """See `TreeMechanism`."""
         document = super().plant_document(label)
         gears = zip(document["joints"], self.stiffness_nm_rad, self.damping_nm_s, strict=True)
         joints = [{**joint, "stiffness_nm_rad": pull, "damping_nm_s": drag} for joint, pull, drag in gears]
-        return {**document, "kind": "elastic-tree", "encoder_side": self.encoder_side, "joints": joints}
+        measured = {"encoder_side": self.encoder_side} | ({"torque_sensor": True} if self.torque_sensor else {})
+        return {**document, "kind": "elastic-tree", **measured, "joints": joints}
