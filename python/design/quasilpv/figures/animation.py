@@ -107,13 +107,16 @@ class Film:
         postures = [skeleton_at(result, time_s) for result in results for time_s in self.times_s]
         corners = np.concatenate(postures)
         self._views = []
+        largest_m = max(
+            result.metrics.max_tool_m for result in results
+        )  # one scale for all: they are beside each other
         for i, (result, colour) in enumerate(zip(results, RUN_COLOURS, strict=True)):
             panel = _space_panel if result.in_space else _plane_panel
             robot = panel(self.figure, grid[0, 2 * i], corners, result)
             glass = self.figure.add_subplot(grid[0, 2 * i + 1])
             if i:
                 robot.tick_params(labelleft=False)
-            self._views.append(_View(result, colour, (robot, glass, distances)))
+            self._views.append(_View(result, colour, (robot, glass, distances), largest_m))
         largest_um = max(float(view.distance_um.max()) for view in self._views)
         distances.set_ylim(LOWEST_DISTANCE_UM, 2.0 * max(largest_um, LOWEST_DISTANCE_UM))
 
@@ -130,14 +133,14 @@ class Film:
 class _View:
     """One run: robot, magnified tool, and its curve of the distance."""
 
-    def __init__(self, result: TrackResult, colour: str, axes: tuple[Axes, Axes, Axes]) -> None:
+    def __init__(self, result: TrackResult, colour: str, axes: tuple[Axes, Axes, Axes], largest_m: float) -> None:
         self._result, self._run = result, result.run
         self._plane = plane_of(result.reference_position_m)
         self._error = (result.tool_position_m - result.reference_position_m)[:, self._plane]
         self.distance_um = 1e6 * result.distance_m
         robot, glass, distances = axes
         self._draw_robot(robot, result, colour)
-        self._draw_glass(glass, colour, result)
+        self._draw_glass(glass, colour, result, largest_m)
         (self._curve,) = distances.plot([], [], color=colour, linewidth=0.9)
 
     def _draw_robot(self, axes: Axes, result: TrackResult, colour: str) -> None:
@@ -149,13 +152,14 @@ class _View:
         self._links = draw_skeleton(axes, start)
         (self._trace,) = axes.plot(*result.tool_position_m[:1].T, color=colour, linewidth=1.2)
 
-    def _draw_glass(self, axes: Axes, colour: str, result: TrackResult) -> None:
-        largest_m, rms_m = result.metrics.max_tool_m, result.metrics.rms_tool_m
+    def _draw_glass(self, axes: Axes, colour: str, result: TrackResult, largest_m: float) -> None:
+        rms_m = result.metrics.rms_tool_m
+        own = length_unit(result.metrics.max_tool_m)
         unit = length_unit(largest_m)
         ring = _round_number(max(largest_m, SMALLEST_RING_M) * unit.factor)
         self._to_glass = unit.factor / ring
         plane = f" {AXES[self._plane[0]]}, {AXES[self._plane[1]]}" if result.in_space else ""
-        caption = f"magnified{plane}:\nring {ring:g} {unit.name}\nrms {rms_m * unit.factor:.3g} {unit.name}"
+        caption = f"magnified{plane}:\nring {ring:g} {unit.name}\nrms {rms_m * own.factor:.3g} {own.name}"
         axes.text(0.0, -1.2, caption, ha="center", va="top", fontsize=8.0)
         angle = np.linspace(0.0, 2.0 * math.pi, 90)
         axes.plot(np.cos(angle), np.sin(angle), color=BLACK, linewidth=0.8)

@@ -44,11 +44,12 @@ def region_figure(
         regions: at least one, all with the same axes.
         title: default: system and condition of the first.
         labels: of several maps; default: condition, representation and number of feasible points.
-        axis_labels: default: the names of the two parameters.
+        axis_labels: default: the names of the two parameters, and whose they are.
     """
     first = regions[0]
     names = labels or [_label(region) for region in regions]
-    x_label, y_label = axis_labels or (first.x.name, first.y.name)
+    whose = f"parameter of {system_kind(first.question.system).stem}"
+    x_label, y_label = axis_labels or (f"{first.x.name}, {whose}", f"{first.y.name}, {whose}")
     with style():
         figure = new_figure(4.2, title or _title(first.question))
         axes = figure.add_subplot()
@@ -80,7 +81,9 @@ def _verdicts(axes: Axes, region: Region) -> None:
         places = np.array([(p.x, p.y) for p in region.points if (p.answer.verdict, p.answer.evidence) == known])
         if places.size:
             axes.plot(*places.T, linestyle="none", marker=marker, color=colour, markersize=size, label=label)
-    if not region.areas:
+    if region.areas:
+        axes.plot([], [], linestyle="none", label="white: asked at the marks only")
+    else:
         _boundary(axes, region, BLACK, "boundary")
 
 

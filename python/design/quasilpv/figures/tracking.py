@@ -19,6 +19,7 @@ from quasilpv.figures.style import (
     ORANGE,
     REFERENCE_COLOUR,
     VERMILION,
+    WIDTH_IN,
     legend_above,
     length_unit,
     new_figure,
@@ -30,6 +31,9 @@ AXES = "XYZ"
 
 NARROWEST = 0.75
 """Of the sides of a path's plot, the shorter one in parts of the longer one."""
+
+AROUND_IN = 1.05
+"""Of a figure of paths, for title, legend and labels."""
 
 MEAN_S = 0.05
 """Of a trace that is mostly noise."""
@@ -100,6 +104,9 @@ def path_figure(result: TrackResult) -> Figure:
         for axes in panels:
             legend_above(axes)
         _widen(panels[0])
+        side = np.ptp(panels[0].get_ylim()) / np.ptp(panels[0].get_xlim())
+        width_in = (WIDTH_IN - AROUND_IN) / max(len(panels), 1.5)
+        figure.set_figheight(float(side) * width_in + AROUND_IN)  # else a band stays empty above the plots
         return figure
 
 
