@@ -15,6 +15,8 @@ from sphinx.writers.html5 import HTML5Translator
 
 LOGGER = logging.getLogger(__name__)
 
+WIDE = 36
+"""More characters of LaTeX may be wider than the screen of a telephone."""
 NAMESPACE = "http://www.w3.org/1998/Math/MathML"
 ACCENTS = {"ˆ", "ˉ", "˙"}
 BARS = {"|", "‖", "∥"}
@@ -68,7 +70,8 @@ def mathml(node: nodes.Element, display: bool) -> str:
 
 def visit_math(self: HTML5Translator, node: nodes.math) -> None:
     """A formula in a line."""
-    self.body.append(mathml(node, display=False))
+    wide = " wide" if len(node.astext()) > WIDE else ""
+    self.body.append(f'<span class="math{wide}">{mathml(node, display=False)}</span>')
     raise nodes.SkipNode
 
 
