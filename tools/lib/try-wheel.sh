@@ -10,7 +10,7 @@ DEBIAN_FRONTEND=noninteractive apt-get -q install --yes --no-install-recommends 
 for command in cc gcc g++ cmake; do
   if command -v "$command"; then exit 1; fi
 done
-if ldconfig -p | grep -E 'libglib|liblcm|libsundials|libsodium|libpcre2-8'; then exit 1; fi
+if ldconfig -p | grep -E 'libglib|liblcm|libsundials|libsodium'; then exit 1; fi
 
 wheel=$(ls "$dist"/quasilpv-*-cp"$(python3 -c 'import sys; print(*sys.version_info[:2], sep="")')"-*.whl)
 python3 -m venv "$HOME/quasilpv"
