@@ -253,12 +253,38 @@ def test_the_page_is_served_on_the_loopback_interface_only_and_follows_its_clock
             socket.create_connection(("127.0.0.2", port), timeout=PATIENCE_S)
         with pytest.raises(InputError, match="--port"):
             Page(playback, port)
+        assert not page.watched  # the command lets no time pass before a browser is there
         page.step(0.5)
         page.step(0.25)
         assert page.player.time_s == pytest.approx(0.75)
     finally:
         page.close()
     assert page.url.startswith(f"http://{HOST}:")
+
+
+class Camera:
+    """What is asked of a browser's camera."""
+
+    def __init__(self, aspect: float) -> None:
+        self.aspect = aspect
+        self.position = self.look_at = np.zeros(3)
+
+
+def test_on_a_screen_that_is_higher_than_wide_expect_the_robot_above_the_controls(playback: Playback) -> None:
+    page = Page(playback, 0)
+    try:
+        wide, high = Camera(1.6), Camera(0.5)
+        for camera in (wide, high):
+            page.scene.fit(camera)
+    finally:
+        page.close()
+    assert not np.any(wide.position)
+    forward = (high.look_at - high.position) / np.linalg.norm(high.look_at - high.position)
+    for point in np.column_stack([*playback.at(0.0).links_m.T]):
+        seen = np.array([point[0], 0.0, point[1]]) - high.position
+        assert seen @ forward > 0.0
+        up = np.array([0.0, 0.0, 1.0]) - forward[2] * forward
+        assert seen @ up > 0.0  # above the middle of the screen, where the controls end
 
 
 WEBSOCKET = {

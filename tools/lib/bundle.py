@@ -78,6 +78,7 @@ def bundle(folder: Path) -> list[str]:
     for program in sorted(scripts.glob("qlpv-*")):
         programs.append(program.rename(home / program.name))
         program.write_text(SCRIPT.format(name=program.name), encoding="utf-8")
+        program.chmod(0o755)
     wanted, found = [*programs], {}
     while wanted:
         for name, place in linked(wanted.pop()).items():

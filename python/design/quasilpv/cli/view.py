@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 import time
 import webbrowser
@@ -65,7 +66,7 @@ def view_command(
     from quasilpv.view.page import Page
     from quasilpv.view.playback import Motion, Playback
 
-    listener = None
+    listener, source = None, ""
     if live:
         if artifact is None or log is not None:
             got = "no --artifact" if artifact is None else f"--log {log}"
@@ -78,8 +79,8 @@ def view_command(
         recorded = open_log(log or LAST, artifact)
         controller, motion = recorded.artifact, Motion.of_log(recorded)
         mechanism = mechanism_of(recorded.scenario.plant)
-        title = f"{recorded.scenario.name}, {recorded.header.controller}"
-    page = Page(Playback(title, motion, mechanism, _disturbance_unit(controller)), port, listener)
+        title, source = f"{recorded.scenario.name}, {recorded.header.controller}", shlex.quote(recorded.source)
+    page = Page(Playback(title, motion, mechanism, _disturbance_unit(controller), source), port, listener)
     if at is not None:
         page.player.playing = False
         page.player.seek(at)
@@ -96,7 +97,7 @@ def _run(page: Page) -> None:
         while True:
             time.sleep(FRAME_S)
             now = time.monotonic()
-            page.step(now - last)
+            page.step(now - last if page.watched else 0.0)
             last = now
     except KeyboardInterrupt:
         page.close()

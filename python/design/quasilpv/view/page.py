@@ -44,12 +44,15 @@ class Page:
         url: of the page.
         player: its clock.
         scene: what is drawn.
+        watched: whether a browser has opened it; a live run is watched from its beginning.
     """
 
     def __init__(self, playback: Playback, port: int, live: LiveMotion | None = None) -> None:
         """Serve."""
         self._playback, self._live = playback, live
         self._server = _serve(port)
+        self.watched = live is not None
+        self._server.on_client_connect(self._welcome)
         self.url = f"http://{HOST}:{self._server.get_port()}"
         self.player = Player.of(playback)
         self._actions: SimpleQueue[Callable[[], None]] = SimpleQueue()
@@ -90,6 +93,10 @@ class Page:
         with _quiet():
             self._server.stop()
 
+    def _welcome(self, client: viser.ClientHandle) -> None:
+        self.watched = True
+        self.scene.fit(client.camera)
+
     # ---- drawing ---------------------------------------------------------------------------------------------------
 
     def _draw(self, instant: Instant) -> None:
@@ -98,6 +105,8 @@ class Page:
         now_s = min(max(self.player.time_s, self._time.min), self._time.max)
         self._time.value = now_s  # type: ignore[misc]  # mypy does not see its setter
         self._status.content = _status(instant, self.scene.exaggeration)
+        if self._share is not None and not self.player.playing:
+            self._share.content = f"`design view --log {self._playback.source} --at {instant.time_s:.3f}`"
         if self._since_plots_s >= PLOT_PERIOD_S or not self.player.playing:
             self._since_plots_s = 0.0
             for plot, curves in zip(self._plots, self._curves, strict=True):
@@ -146,6 +155,11 @@ class Page:
         with gui.add_folder("show", expand_by_default=False):
             shadow = gui.add_checkbox("robot on its reference", self.scene.show_shadow)
             magnified = gui.add_checkbox("tool path, error magnified", True)
+        self._share: viser.GuiMarkdownHandle | None = None
+        if playback.source:
+            with gui.add_folder("share", expand_by_default=False):
+                gui.add_markdown("Whoever has the file opens this moment with (pause to update):")
+                self._share = gui.add_markdown(f"`design view --log {playback.source}`")
         gui.add_html(_legend(playback.motion.angle_rad.shape[1]))
 
         def show(_: object) -> None:

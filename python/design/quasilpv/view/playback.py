@@ -133,12 +133,14 @@ class Playback:
         motion: its samples, at least one.
         mechanism: whose links are drawn.
         disturbance_unit: of estimate and disturbance.
+        source: name of the log, as others may have it; empty of a live run.
     """
 
     title: str
     motion: Motion
     mechanism: Drawing
     disturbance_unit: str
+    source: str = ""
 
     @property
     def begin_s(self) -> float:

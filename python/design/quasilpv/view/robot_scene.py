@@ -30,6 +30,8 @@ BEFORE_THE_PLANE = np.array([0.3, -1.2, 0.25])
 """Where the camera starts, from the middle of a planar robot, in parts of its extent."""
 DISTANCE = 1.35
 """The same of a robot in space, from where `Viewpoint` looks."""
+BELOW = 0.42
+"""How far below the robot's middle a camera looks that sees it above the controls, in parts of what it sees."""
 _EAST = np.array([1.0, 0.0, 0.0])
 
 
@@ -76,6 +78,7 @@ class RobotScene:
         # The controls cover the right quarter of the page.
         right = np.cross([0.0, 0.0, 1.0], self._towards)
         look_at = centre + 0.22 * extent * right / np.linalg.norm(right)
+        self._centre, self._extent = centre, extent
         server.initial_camera.look_at = _triple(look_at)
         server.initial_camera.position = _triple(look_at + extent * self._towards)
         self._scene.add_grid(
@@ -86,6 +89,13 @@ class RobotScene:
             section_size=0.5 * extent,
             position=(centre[0], centre[1], min(low[2], 0.0) if stands else low[2] - 0.15 * extent),
         )
+
+    def fit(self, camera: viser.CameraHandle) -> None:
+        """On a screen that is higher than wide the controls cover the lower part: look at the robot above them."""
+        if camera.aspect < 1.0:
+            look_at = self._centre - np.array([0.0, 0.0, BELOW * self._extent / camera.aspect])
+            camera.position = look_at + 1.15 * self._extent / camera.aspect * self._towards
+            camera.look_at = look_at
 
     def show_paths(self, playback: Playback) -> None:
         """Draw the reference of the whole motion, the way of the tool, and that way with its error exaggerated."""
