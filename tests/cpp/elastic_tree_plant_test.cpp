@@ -29,8 +29,22 @@ ElasticTreeParameters elastic_arm(double damping, double friction) {
   return parameters;
 }
 
-TEST(ElasticTreePlant, has_the_iteration_matrix_of_its_residual) {
-  ElasticTreePlant plant(elastic_arm(2.0, 1.5));
+/// Joints that stick in an arm whose drives control torques.
+ElasticTreeParameters sticking_arm(double lag_s) {
+  ElasticTreeParameters parameters = elastic_arm(2.0, 1.5);
+  for (std::size_t k : {0, 2}) {
+    JointFriction& friction = parameters.friction[k];
+    friction.breakaway_nm = 1.5 * friction.coulomb_nm;
+    friction.stribeck_speed_rad_s = 0.5;
+    friction.presliding_rad = 0.05;
+    friction.presliding_damping_nm_s = 3.0;
+  }
+  parameters.torque_loop = {4.0, lag_s};
+  return parameters;
+}
+
+void expect_iteration_matrix(const ElasticTreeParameters& parameters) {
+  ElasticTreePlant plant(parameters);
   plant.set_external_torque(ExternalTorque({{1, 20.0, 15.0, 0.3}}));
   const double c_j = 250.0;
   const double step = 1e-6;
@@ -52,15 +66,56 @@ TEST(ElasticTreePlant, has_the_iteration_matrix_of_its_residual) {
   }
 }
 
+TEST(ElasticTreePlant, has_the_iteration_matrix_of_its_residual) {
+  expect_iteration_matrix(elastic_arm(2.0, 1.5));
+  expect_iteration_matrix(sticking_arm(0.0));
+  expect_iteration_matrix(sticking_arm(2e-3));
+}
+
 TEST(ElasticTreePlant, has_the_derivative_that_makes_its_residual_zero) {
-  ElasticTreePlant plant(elastic_arm(2.0, 1.5));
-  plant.set_torque({3.0, -20.0, 5.0, 1.0});
-  const Eigen::VectorXd y = Eigen::VectorXd::LinSpaced(plant.size(), -0.9, 0.8);
+  for (const ElasticTreeParameters& parameters : {elastic_arm(2.0, 1.5), sticking_arm(0.0), sticking_arm(2e-3)}) {
+    ElasticTreePlant plant(parameters);
+    plant.set_torque({3.0, -20.0, 5.0, 1.0});
+    const Eigen::VectorXd y = Eigen::VectorXd::LinSpaced(plant.size(), -0.9, 0.8);
+    Eigen::VectorXd y_dot(plant.size());
+    plant.derivative(0.0, y, y_dot);
+    Eigen::VectorXd residual(plant.size());
+    plant.residual(0.0, y, y_dot, residual);
+    EXPECT_LT(residual.cwiseAbs().maxCoeff(), 1e-9 * (1.0 + y_dot.cwiseAbs().maxCoeff()));
+  }
+}
+
+// s (command - spring) + spring instead of the command: a rotor of B / s under the command itself.
+TEST(ElasticTreePlant, a_torque_loop_makes_the_rotor_smaller) {
+  ElasticTreeParameters looped = elastic_arm(2.0, 0.0);
+  ElasticTreeParameters smaller = looped;
+  looped.torque_loop = {4.0, 0.0};
+  for (ElasticGear& gear : smaller.gears) {
+    gear.rotor_inertia_kg_m2 /= 4.0;
+  }
+  ElasticTreePlant one(looped);
+  ElasticTreePlant other(smaller);
+  const Eigen::VectorXd y = Eigen::VectorXd::LinSpaced(one.size(), -0.02, 0.03);
+  Eigen::VectorXd first(one.size());
+  Eigen::VectorXd second(one.size());
+  for (ElasticTreePlant* plant : {&one, &other}) {
+    plant->set_torque({3.0, -20.0, 5.0, 1.0});
+    plant->derivative(0.0, y, plant == &one ? first : second);
+  }
+  EXPECT_LT((first - second).cwiseAbs().maxCoeff(), 1e-9 * (1.0 + second.cwiseAbs().maxCoeff()));
+}
+
+TEST(ElasticTreePlant, when_its_drives_lag_expect_them_to_begin_with_what_holds_the_robot) {
+  ElasticTreePlant plant(sticking_arm(2e-3));
+  const JointArray angle{0.3, -0.5, 0.4, 0.2};
+  const Eigen::VectorXd y = plant.initial_state(angle, {});
+  EXPECT_EQ(y.size(), 6 * kJoints);
+  JointArray weight{};
+  std::copy_n(y.data() + 4 * kJoints, kJoints, weight.begin());
+  plant.set_torque(weight);
   Eigen::VectorXd y_dot(plant.size());
   plant.derivative(0.0, y, y_dot);
-  Eigen::VectorXd residual(plant.size());
-  plant.residual(0.0, y, y_dot, residual);
-  EXPECT_LT(residual.cwiseAbs().maxCoeff(), 1e-9 * (1.0 + y_dot.cwiseAbs().maxCoeff()));
+  EXPECT_LT(y_dot.cwiseAbs().maxCoeff(), 1e-8);
 }
 
 // Without damping and friction nothing takes energy out; with them it only falls.
@@ -92,6 +147,34 @@ TEST(ElasticTreePlant, keeps_its_energy_without_damping_and_loses_it_with) {
       EXPECT_LT(plant.energy(y), before - 0.01);
     }
   }
+}
+
+// With undamped gears friction alone takes energy out, step by step, its bristles included.
+TEST(ElasticTreePlant, never_gains_energy_from_joints_that_stick) {
+  ElasticTreeParameters parameters = sticking_arm(0.0);
+  parameters.torque_loop = {};
+  for (std::size_t k = 0; k < kJoints; ++k) {
+    parameters.gears[k].damping_nm_s = 0.0;
+    parameters.friction[k] = {0.0, 1.0, 1.0, 1.8, 0.05, 2e-3, 10.0};
+  }
+  const ElasticTreePlant plant(parameters);
+  Eigen::VectorXd y = plant.initial_state({0.3, -0.5, 0.4, 0.2}, {});
+  y.segment(kJoints, kJoints).array() += 0.003;
+  const double start = plant.energy(y);
+  double before = start;
+  const double h = 5e-5;
+  Eigen::VectorXd k1(plant.size()), k2(plant.size()), k3(plant.size()), k4(plant.size());
+  for (int step = 0; step < 6000; ++step) {
+    plant.derivative(0.0, y, k1);
+    plant.derivative(0.0, y + h / 2.0 * k1, k2);
+    plant.derivative(0.0, y + h / 2.0 * k2, k3);
+    plant.derivative(0.0, y + h * k3, k4);
+    y += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+    const double now = plant.energy(y);
+    ASSERT_LE(now, before + 1e-7) << step;
+    before = now;
+  }
+  EXPECT_LT(before, start - 0.01);
 }
 
 TEST(ElasticTreePlant, shows_encoders_on_the_side_they_sit_on_and_the_motors_to_the_brake) {

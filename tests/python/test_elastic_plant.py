@@ -132,6 +132,36 @@ def test_when_gears_have_sensors_expect_those_and_no_others_with_the_motion_of_t
         session.advance(torque)
 
 
+@pytest.mark.parametrize("lag_s", [0.0, 2e-3])
+def test_when_drives_control_torques_expect_their_equation(lag_s: float) -> None:
+    """``lag u' + u = s (command - spring) + spring``."""
+    arm, n, rng = random_arm(3, 14), 3, np.random.default_rng(15)
+    content = document(arm, IDA, sine=False)
+    content["plant"]["torque_loop"] = {"gain": 5.0, "lag_s": lag_s}
+    assert Scenario.from_document(content).to_document() == content
+    plant = _runtime.Plant(parsed(content))
+    for _ in range(10):
+        q, w, v, u, command = rng.normal(size=(5, n))
+        th = q + 1e-3 * rng.normal(size=n)
+        y = np.concatenate([q, th, w, v])
+        spring = arm.spring(q, th, w, v)
+        wanted = 5.0 * (command - spring) + spring
+        expected = arm.derivative(y, u if lag_s else wanted, np.zeros(n))
+        if lag_s:
+            y, expected = np.concatenate([y, u]), np.concatenate([expected, (wanted - u) / lag_s])
+        found = plant.derivative(0.0, y, command)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * (1.0 + np.abs(expected).max()))
+
+
+@pytest.mark.parametrize(("field", "value"), [("gain", 0.5), ("lag_s", -1e-3)])
+def test_when_a_torque_loop_is_none_expect_it_refused_by_name_on_both_sides(field: str, value: float) -> None:
+    content = document(random_arm(2, 3), IDA)
+    content["plant"]["torque_loop"] = {"gain": 4.0, "lag_s": 0.0, field: value}
+    for read in (parsed, lambda tree: Scenario.from_document(tree, "scenario")):
+        with pytest.raises(InputError, match=rf"torque_loop\.{field}"):
+            read(content)
+
+
 def free_joint(damping: float) -> ElasticArm:
     """One joint about a vertical axis: two discs and a spring."""
     arm = random_arm(1, 5)

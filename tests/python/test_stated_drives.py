@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -57,7 +58,27 @@ def test_when_encoders_and_torque_sensors_are_stated_expect_the_class(
     tmp_path: Path, side: str, sensor: str, loop: str, expected: ArmClass
 ) -> None:
     drive = GEAR.replace('"motor"', f'"{side}"') + f"\ntorque_sensor = {sensor}\ntorque_loop = {loop}"
-    assert robot_with(tmp_path, drive, drive).arm_class is expected
+    robot = robot_with(tmp_path, drive, drive)
+    assert robot.arm_class is expected
+    document = robot.with_payload_fraction(1.0).plant_document("perturbed")
+    assert document["encoder_side"] == side
+    assert document.get("torque_sensor", False) == (sensor == "true")
+    assert document.get("torque_loop") == ({"gain": 4.0, "lag_s": 0.0} if loop == "true" else None)
+    lagging = replace(robot, lag_s=(1e-3, 2e-3)).with_payload_fraction(0.5).plant_document("perturbed")
+    assert lagging["torque_loop"] == {"gain": 4.0 if loop == "true" else 1.0, "lag_s": pytest.approx(1.5e-3)}
+    assert "lag_s" not in lagging
+
+
+def test_when_a_break_away_torque_is_stated_expect_plants_that_stick_and_nonsense_refused(tmp_path: Path) -> None:
+    friction = "\nfriction_coulomb = 0.5\nfriction_breakaway = "
+    for drive in (GEAR, "rigid = true"):
+        robot = robot_with(tmp_path, drive + friction + "0.8", drive + friction + "0.0")
+        first, second = robot.with_payload_fraction(0.0).plant_document("nominal")["joints"]
+        assert first["stick_slip"]["breakaway_nm"] == 0.8
+        assert "stick_slip" not in second
+    for stated in (friction + "0.4", "\nfriction_breakaway = 0.4"):
+        with pytest.raises(InputError, match=r"joints\.shoulder\.friction_breakaway: got 0\.4, expected at least fri"):
+            robot_with(tmp_path, GEAR + stated, GEAR)
 
 
 def test_when_joints_are_of_several_classes_expect_the_one_that_measures_least() -> None:

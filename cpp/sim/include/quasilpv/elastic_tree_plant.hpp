@@ -19,6 +19,13 @@ struct ElasticGear {
   double rotor_inertia_kg_m2 = 0.0;  ///< B > 0, reflected to the joint
 };
 
+/// A drive that controls the torque in its joint: its motor's torque follows s (command - spring) + spring, so that the
+/// link feels a rotor of B / s. Gain 1 is none.
+struct TorqueLoop {
+  double gain = 1.0;   ///< s >= 1
+  double lag_s = 0.0;  ///< time constant with which the motor's torque follows, >= 0; 0: an ideal drive
+};
+
 /// Physical parameters, the payload merged into the last body; 1 to 7 joints.
 struct ElasticTreeParameters {
   std::string label;
@@ -26,13 +33,16 @@ struct ElasticTreeParameters {
   std::vector<ElasticGear> gears;       ///< one per joint
   std::vector<JointFriction> friction;  ///< of the motors, one per joint
   std::uint32_t sensors = kMotorAngle;  ///< GearSensor bits; encoders on one side at least
+  TorqueLoop torque_loop{};             ///< the same in all joints
 };
 
-/// The robot as a plant, y = (q, th, w, v): joint angles, motor angles reflected to the joints, and their rates.
+/// The robot as a plant, y = (q, th, w, v): joint angles, motor angles reflected to the joints, and their rates; where
+/// drives lag then u, the motors' torques, which begin as what holds the robot; where a joint sticks then its bristles.
 ///
 ///     q' - w = 0,   th' - v = 0
-///     M(q) w' + h(q, w) - K (th - q) - D (v - w) - external torque = 0
-///     B v' + f v + c tanh(v / w0) + K (th - q) + D (v - w) - torque = 0
+///     M(q) w' + h(q, w) - spring - external torque = 0,   spring = K (th - q) + D (v - w)
+///     B v' + friction + spring - u = 0
+///     lag u' + u - s control - (1 - s) spring = 0         without lag an equation that gives u
 ///
 /// M and h of the links alone, as in TreeDynamics; rotors turn about their joints only. It begins with the springs
 /// carrying the weight. Source: Spong 1987, Modeling and control of elastic joint robots.
@@ -44,26 +54,30 @@ class ElasticTreePlant final : public Plant {
   const ElasticTreeParameters& parameters() const noexcept { return parameters_; }
 
   int joints() const noexcept override { return dynamics_.joints(); }
-  int size() const noexcept override { return 4 * dynamics_.joints(); }
+  int size() const noexcept override { return (lags() ? 5 : 4) * dynamics_.joints() + friction_.bristles(); }
+  Eigen::VectorXd absolute_tolerance(double tolerance) const override;
   Eigen::VectorXd initial_state(const JointArray& angle, const JointArray& speed) const override;
   void residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept override;
   void jacobian(double t, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept override;
   void derivative(double t, ConstVector y, Vector y_dot) const override;
   PlantSample sample(double t, ConstVector y) const override;
 
-  /// Kinetic, gravity's and the springs' energy, J; see TreeDynamics::energy().
+  /// Kinetic, gravity's, the springs' and the bristles' energy, J; see TreeDynamics::energy().
   double energy(ConstVector y) const;
 
  private:
   /// K (th - q) + D (v - w), N m.
   TreeVector spring_torque(ConstVector y) const noexcept;
-  TreeVector friction(ConstVector motor_speed) const noexcept;
+  bool lags() const noexcept { return parameters_.torque_loop.lag_s > 0.0; }
+  /// What the drives' torques follow, N m.
+  TreeVector wanted_torque(const TreeVector& spring) const noexcept;
 
   ElasticTreeParameters parameters_;
   TreeDynamics dynamics_;
   TreeVector stiffness_;
   TreeVector damping_;
   TreeVector rotor_;
+  PlantFriction friction_;
 };
 
 }  // namespace quasilpv

@@ -5,17 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "quasilpv/joint_friction.hpp"
 #include "quasilpv/kinematic_tree.hpp"
 #include "quasilpv/plant.hpp"
 
 namespace quasilpv {
-
-/// Friction of one joint, N m: viscous f w, and Coulomb friction smoothed to c tanh(w / w0).
-struct JointFriction {
-  double viscous_nm_s = 0.0;          ///< f >= 0
-  double coulomb_nm = 0.0;            ///< c >= 0
-  double coulomb_speed_rad_s = 1e-3;  ///< w0 > 0: below it the joint creeps instead of sticking
-};
 
 /// Physical parameters of a robot in space, its payload merged into the last body; 1 to 7 joints.
 struct TreePlantParameters {
@@ -26,10 +20,11 @@ struct TreePlantParameters {
 };
 
 /// The robot as a plant, y = (q, w): joint coordinates (rad; m for a joint that slides) and their rates; where the
-/// drives lag y = (q, w, u), u the torque they deliver, which begins as what holds the robot.
+/// drives lag y = (q, w, u), u the torque they deliver, which begins as what holds the robot. Where a joint sticks the
+/// bristles of all joints come last.
 ///
 ///     q' - w = 0
-///     M(q) w' + h(q, w) + f w + c tanh(w / w0) - torque = 0,   torque = control + external, or u + external
+///     M(q) w' + h(q, w) + friction - torque = 0,   torque = control + external, or u + external
 ///     lag u' + u - control = 0
 ///
 /// M and h as in TreeDynamics. Source: Featherstone 2008, chapters 5 and 6.
@@ -42,7 +37,8 @@ class TreePlant final : public Plant {
   const TreeDynamics& dynamics() const noexcept { return dynamics_; }
 
   int joints() const noexcept override { return dynamics_.joints(); }
-  int size() const noexcept override { return (lags() ? 3 : 2) * dynamics_.joints(); }
+  int size() const noexcept override { return (lags() ? 3 : 2) * dynamics_.joints() + friction_.bristles(); }
+  Eigen::VectorXd absolute_tolerance(double tolerance) const override;
   Eigen::VectorXd initial_state(const JointArray& angle, const JointArray& speed) const override;
   void residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept override;
   void jacobian(double t, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept override;
@@ -51,12 +47,12 @@ class TreePlant final : public Plant {
 
  private:
   bool lags() const noexcept { return parameters_.lag_s > 0.0; }
-  TreeVector friction(ConstVector speed) const noexcept;
   /// What acts on the joints: from the drives and from outside, N m.
   TreeVector acting_torque(double t, ConstVector y) const noexcept;
 
   TreePlantParameters parameters_;
   TreeDynamics dynamics_;
+  PlantFriction friction_;
 };
 
 }  // namespace quasilpv

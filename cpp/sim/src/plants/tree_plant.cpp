@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "plants/read_friction.hpp"
 #include "plants/registry.hpp"
 #include "quasilpv/decimal.hpp"
 #include "quasilpv/errors.hpp"
@@ -15,14 +16,6 @@ namespace {
 
 // See SerialArm: below this fraction of a diagonal entry, accelerations have lost all but four of their digits.
 constexpr double kSmallestPivotRatio = 1e-12;
-
-JointFriction read_friction(const Field& joint) {
-  JointFriction friction;
-  friction.viscous_nm_s = joint["friction_viscous_nm_s"].non_negative();
-  friction.coulomb_nm = joint["friction_coulomb_nm"].non_negative();
-  friction.coulomb_speed_rad_s = joint["coulomb_speed_rad_s"].positive();
-  return friction;
-}
 
 JointArray joint_array(Plant::ConstVector x) noexcept {
   JointArray array{};
@@ -41,7 +34,7 @@ TreePlantParameters read_tree_plant(const Field& field) {
   for (std::size_t k = 0; k < joints.size(); ++k) {
     joints.at(k).only({"name", "kind", "rotation", "translation_m", "axis", "mass_kg", "first_moment_kg_m",
                        "rotational_kg_m2", "rotor_inertia_kg_m2", "friction_viscous_nm_s", "friction_coulomb_nm",
-                       "coulomb_speed_rad_s"});
+                       "coulomb_speed_rad_s", "stick_slip"});
     parameters.friction.push_back(read_friction(joints.at(k)));
   }
   return parameters;
@@ -50,11 +43,19 @@ TreePlantParameters read_tree_plant(const Field& field) {
 }  // namespace
 
 TreePlant::TreePlant(TreePlantParameters parameters)
-    : parameters_(std::move(parameters)), dynamics_(parameters_.tree) {}
+    : parameters_(std::move(parameters)),
+      dynamics_(parameters_.tree),
+      friction_(parameters_.friction, dynamics_.joints(), (lags() ? 3 : 2) * dynamics_.joints()) {}
+
+Eigen::VectorXd TreePlant::absolute_tolerance(double tolerance) const {
+  Eigen::VectorXd tolerances = Plant::absolute_tolerance(tolerance);
+  friction_.loosen(tolerances);
+  return tolerances;
+}
 
 Eigen::VectorXd TreePlant::initial_state(const JointArray& angle, const JointArray& speed) const {
   const int n = joints();
-  Eigen::VectorXd y(size());
+  Eigen::VectorXd y = Eigen::VectorXd::Zero(size());
   y.head(n) = Eigen::Map<const Eigen::VectorXd>(angle.data(), n);
   y.segment(n, n) = Eigen::Map<const Eigen::VectorXd>(speed.data(), n);
   if (lags()) {
@@ -71,16 +72,7 @@ TreeVector TreePlant::acting_torque(double t, ConstVector y) const noexcept {
     return Eigen::Map<const Eigen::VectorXd>(torque.data(), n);
   }
   const JointArray external = external_torque().at(t);
-  return y.tail(n) + Eigen::Map<const Eigen::VectorXd>(external.data(), n);
-}
-
-TreeVector TreePlant::friction(ConstVector speed) const noexcept {
-  TreeVector torque(joints());
-  for (int k = 0; k < joints(); ++k) {
-    const JointFriction& own = parameters_.friction[static_cast<std::size_t>(k)];
-    torque[k] = own.viscous_nm_s * speed[k] + own.coulomb_nm * std::tanh(speed[k] / own.coulomb_speed_rad_s);
-  }
-  return torque;
+  return y.segment(2 * n, n) + Eigen::Map<const Eigen::VectorXd>(external.data(), n);
 }
 
 void TreePlant::residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept {
@@ -88,11 +80,14 @@ void TreePlant::residual(double t, ConstVector y, ConstVector y_dot, Vector resi
   residual.head(n) = y_dot.head(n) - y.segment(n, n);
   TreeVector moving(n);
   dynamics_.inverse_dynamics(y.data(), y.data() + n, y_dot.data() + n, moving.data());
-  residual.segment(n, n) = moving + friction(y.segment(n, n)) - acting_torque(t, y);
+  residual.segment(n, n) = moving + friction_.torque(y) - acting_torque(t, y);
   if (lags()) {
-    residual.tail(n) =
-        parameters_.lag_s * y_dot.tail(n) + y.tail(n) - Eigen::Map<const Eigen::VectorXd>(torque().data(), n);
+    residual.segment(2 * n, n) = parameters_.lag_s * y_dot.segment(2 * n, n) + y.segment(2 * n, n) -
+                                 Eigen::Map<const Eigen::VectorXd>(torque().data(), n);
   }
+  const int bristles = friction_.bristles();
+  friction_.bristle_rates(y, residual.tail(bristles));
+  residual.tail(bristles) = y_dot.tail(bristles) - residual.tail(bristles);
 }
 
 void TreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept {
@@ -100,11 +95,6 @@ void TreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVector y_
   TreeMatrix by_coordinate;
   TreeMatrix by_speed;
   dynamics_.derivatives(y.data(), y.data() + n, y_dot.data() + n, by_coordinate, by_speed);
-  for (int k = 0; k < n; ++k) {
-    const JointFriction& own = parameters_.friction[static_cast<std::size_t>(k)];
-    const double slope = 1.0 / std::cosh(std::min(std::abs(y[n + k]) / own.coulomb_speed_rad_s, 300.0));
-    by_speed(k, k) += own.viscous_nm_s + own.coulomb_nm / own.coulomb_speed_rad_s * slope * slope;
-  }
   jacobian.setZero();
   jacobian.topLeftCorner(n, n).diagonal().setConstant(c_j);
   jacobian.block(0, n, n, n).diagonal().setConstant(-1.0);
@@ -114,6 +104,7 @@ void TreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVector y_
     jacobian.block(n, 2 * n, n, n).diagonal().setConstant(-1.0);
     jacobian.block(2 * n, 2 * n, n, n).diagonal().setConstant(1.0 + c_j * parameters_.lag_s);
   }
+  friction_.add_jacobian(y, c_j, n, jacobian);
 }
 
 void TreePlant::derivative(double t, ConstVector y, Vector y_dot) const {
@@ -128,10 +119,12 @@ void TreePlant::derivative(double t, ConstVector y, Vector y_dot) const {
   TreeVector motion(n);
   dynamics_.inverse_dynamics(y.data(), y.data() + n, rest.data(), motion.data());
   y_dot.head(n) = y.segment(n, n);
-  y_dot.segment(n, n) = cholesky.solve(acting_torque(t, y) - motion - friction(y.segment(n, n)));
+  y_dot.segment(n, n) = cholesky.solve(acting_torque(t, y) - motion - friction_.torque(y));
   if (lags()) {
-    y_dot.tail(n) = (Eigen::Map<const Eigen::VectorXd>(torque().data(), n) - y.tail(n)) / parameters_.lag_s;
+    y_dot.segment(2 * n, n) =
+        (Eigen::Map<const Eigen::VectorXd>(torque().data(), n) - y.segment(2 * n, n)) / parameters_.lag_s;
   }
+  friction_.bristle_rates(y, y_dot.tail(friction_.bristles()));
 }
 
 PlantSample TreePlant::sample(double t, ConstVector y) const {

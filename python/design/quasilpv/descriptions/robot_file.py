@@ -63,6 +63,7 @@ class Joint(DriveKeys):
     encoder_bits: int | None = Field(default=None, ge=8, le=32)
     friction_viscous: NonNegative = 0.0
     friction_coulomb: NonNegative = 0.0
+    friction_breakaway: NonNegative = 0.0
     motion_angle: Interval | None = None
     motion_speed: Positive | None = None
 
@@ -70,6 +71,10 @@ class Joint(DriveKeys):
     def _check(self) -> Self:
         if self.angle is not None and not self.angle[0] < self.angle[1]:
             raise FieldError("angle", list(self.angle), "a lower bound below the upper bound")
+        sticks = self.friction_breakaway > 0.0
+        if sticks and (self.friction_coulomb == 0.0 or self.friction_breakaway < self.friction_coulomb):
+            expected = "at least friction_coulomb, which is to be stated with it; or 0 for a joint that does not stick"
+            raise FieldError("friction_breakaway", self.friction_breakaway, expected)
         if self.motion_angle is not None and not self.motion_angle[0] < self.motion_angle[1]:
             raise FieldError("motion_angle", list(self.motion_angle), "a lower bound below the upper bound")
         return self
@@ -241,6 +246,7 @@ def _joint(source: str, described: DescribedJoint, stated: Joint) -> SpatialJoin
         motion_angle_rad=stated.motion_angle,
         motion_speed_rad_s=stated.motion_speed,
         drive=drive,
+        friction_breakaway_nm=stated.friction_breakaway,
     )
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, Self, TypeAlias
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from quasilpv.documents.mechanism import FiveBarLinks, MechanismDocument, Row, Rows, SerialLinks, SpringDisc, TreeJoint
 from quasilpv.documents.payloads import TreePayloads
 from quasilpv.documents.programs import MAX_JOINTS
-from quasilpv.documents.strict_model import NonNegative, Positive, StrictModel
+from quasilpv.documents.strict_model import FieldError, NonNegative, Positive, StrictModel
 
 
 class _Labelled(StrictModel):
@@ -43,16 +43,44 @@ class SpringDiscPlant(SpringDisc, _Labelled):
     inertia_uncertainty_per_kg: NonNegative
 
 
+class StickSlip(StrictModel):
+    """How a joint sticks at rest and slips; the equations are with `JointFriction` of the simulator.
+
+    Attributes:
+        breakaway_nm: torque up to which it sticks, at least the Coulomb friction, at which it slides.
+        stribeck_speed_rad_s: speed at which friction has fallen from there to Coulomb's by 1 - 1/e.
+        presliding_rad: how far the joint gives before it breaks away.
+        presliding_damping_nm_s: damping of that.
+    """
+
+    breakaway_nm: Positive
+    stribeck_speed_rad_s: Positive
+    presliding_rad: Positive
+    presliding_damping_nm_s: NonNegative
+
+
 class RubbingJoint(TreeJoint):
     """A joint with friction.
 
     Attributes:
         coulomb_speed_rad_s: speed w0 in the friction torque ``viscous w + coulomb tanh(w / w0)``.
+        stick_slip: in the place of that smoothed Coulomb friction; None: smoothed.
     """
 
     friction_viscous_nm_s: NonNegative
     friction_coulomb_nm: NonNegative
     coulomb_speed_rad_s: Positive
+    stick_slip: StickSlip | None = None
+
+    @model_validator(mode="after")
+    def _check_stick_slip(self) -> Self:
+        if self.stick_slip is None:
+            return self
+        if self.friction_coulomb_nm == 0.0:
+            raise FieldError("friction_coulomb_nm", 0, "more than 0 with stick_slip")
+        if self.stick_slip.breakaway_nm < self.friction_coulomb_nm:
+            raise FieldError("stick_slip.breakaway_nm", self.stick_slip.breakaway_nm, "at least friction_coulomb_nm")
+        return self
 
 
 class ToolFrame(StrictModel):
@@ -98,12 +126,25 @@ class ElasticJoint(RubbingJoint):
     damping_nm_s: NonNegative
 
 
+class TorqueLoop(StrictModel):
+    """Drives that control the torque in their joints: see `TorqueLoop` of the simulator.
+
+    Attributes:
+        gain: by which the rotor that the link feels is smaller than the motor's; 1: no loop.
+        lag_s: time constant with which the motor's torque follows; 0: an ideal drive.
+    """
+
+    gain: Annotated[float, Field(ge=1)]
+    lag_s: NonNegative
+
+
 class ElasticTreePlant(MechanismDocument, _Labelled):
     """A robot in space with elastic joints: motors and links move on their own.
 
     Attributes:
         encoder_side: what the encoders sit on; of both, the angle of a reading is the motor's.
         torque_sensor: whether the torque in the joints is measured.
+        torque_loop: of all drives; None: their torques are their commands.
         tool: as of a `TreePlant`.
     """
 
@@ -113,6 +154,7 @@ class ElasticTreePlant(MechanismDocument, _Labelled):
     gravity_m_s2: Row
     encoder_side: Literal["motor", "link", "both"]
     torque_sensor: bool = False
+    torque_loop: TorqueLoop | None = None
     chain: Annotated[tuple[ElasticJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
     tool: ToolFrame | None = None
 

@@ -101,6 +101,7 @@ OPTIONAL: Mapping[str, object] = {
     "sensors.link_encoder_bits": None,
     "plant.lag_s": 0.0,
     "plant.torque_sensor": False,
+    "plant.torque_loop": None,
     "plant.tool": None,
 }
 """Members a scenario file may leave out, as files written before they were there do; and what that says."""
@@ -142,10 +143,11 @@ class Scenario(StrictModel):
         joints = self.plant.joints
         if isinstance(self.integrator, MujocoIntegrator) and not isinstance(self.plant, TreePlant):
             raise FieldError("integrator.kind", "mujoco", f"ida or rk4 with a plant of kind {self.plant.kind}")
-        if isinstance(self.integrator, MujocoIntegrator) and isinstance(self.plant, TreePlant) and self.plant.lag_s:
-            raise FieldError("integrator.kind", "mujoco", "ida or rk4 with drives that lag")
-        if isinstance(self.integrator, MujocoIntegrator) and isinstance(self.plant, TreePlant) and self.plant.lag_s:
-            raise FieldError("integrator.kind", "mujoco", "ida or rk4 with drives that lag")
+        if isinstance(self.integrator, MujocoIntegrator) and isinstance(self.plant, TreePlant):
+            if self.plant.lag_s:
+                raise FieldError("integrator.kind", "mujoco", "ida or rk4 with drives that lag")
+            if any(joint.stick_slip is not None for joint in self.plant.chain):
+                raise FieldError("integrator.kind", "mujoco", "ida or rk4 with joints that stick")
         if self.torque_limit_nm is not None and len(self.torque_limit_nm) != joints:
             raise FieldError("torque_limit_nm", f"{len(self.torque_limit_nm)} entries", str(joints))
         for field in ("angle_rad", "speed_rad_s"):
@@ -164,6 +166,9 @@ class Scenario(StrictModel):
             holder = document[place[0]] if place else document
             if name in holder and holder[name] == unsaid:
                 del holder[name]
+        for joint in document["plant"].get("joints", ()):
+            if joint.get("stick_slip", 0) is None:
+                del joint["stick_slip"]
         return document
 
     @classmethod

@@ -15,7 +15,7 @@ from quasilpv.systems.robots.arm_parameters import ActuatorLimits, OperatingDoma
 from quasilpv.systems.robots.joint_drive import ArmClass, ElasticDrive, arm_class
 from quasilpv.systems.robots.spatial import Placement, SpatialInertia
 from quasilpv.systems.robots.tree import KinematicTree
-from quasilpv.systems.robots.tree_mechanism import ElasticMechanism, TreeMechanism
+from quasilpv.systems.robots.tree_mechanism import TORQUE_LOOP_GAIN, ElasticMechanism, TreeMechanism
 
 Interval = tuple[float, float]
 
@@ -38,6 +38,8 @@ class SpatialJoint:
         motion_angle_rad, motion_speed_rad_s: interval and largest speed that a proof in motion holds in; None for those
             above.
         drive: a gear that gives; None for a rigid joint.
+        friction_breakaway_nm: torque up to which the joint sticks when it is simulated, at least its Coulomb friction;
+            0: it does not stick, its Coulomb friction is smoothed.
     """
 
     name: str
@@ -53,6 +55,7 @@ class SpatialJoint:
     motion_angle_rad: Interval | None = None
     motion_speed_rad_s: float | None = None
     drive: ElasticDrive | None = None
+    friction_breakaway_nm: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -223,10 +226,11 @@ class SpatialRobot:
     def _with_friction(self, tree: KinematicTree, fraction: float = 0.0) -> TreeMechanism:
         viscous = tuple(joint.friction_viscous_nm_s for joint in self.joints)
         coulomb = tuple(joint.friction_coulomb_nm for joint in self.joints)
+        sticking = tuple(joint.friction_breakaway_nm for joint in self.joints)
         drives = [joint.drive for joint in self.joints if joint.drive is not None]
+        lag_s = self.lag_s[0] + fraction * (self.lag_s[1] - self.lag_s[0])
         if not drives:
-            shortest, longest = self.lag_s
-            return TreeMechanism(tree, viscous, coulomb, shortest + fraction * (longest - shortest))
+            return TreeMechanism(tree, viscous, coulomb, lag_s, sticking)
         # The gears that are simulated are in the middle of their interval, with the least damping.
         stiffness = tuple(sqrt(drive.stiffness_nm_rad[0] * drive.stiffness_nm_rad[1]) for drive in drives)
         damping = tuple(drive.damping_least_s * pull for drive, pull in zip(drives, stiffness, strict=True))
@@ -234,10 +238,13 @@ class SpatialRobot:
             tree,
             viscous,
             coulomb,
+            lag_s,
+            sticking,
             stiffness_nm_rad=stiffness,
             damping_nm_s=damping,
             encoder_side=drives[0].encoder_side,
             torque_sensor=all(drive.torque_sensor for drive in drives),
+            torque_gain=TORQUE_LOOP_GAIN if all(drive.torque_loop for drive in drives) else 1.0,
         )
 
     @property
@@ -250,6 +257,17 @@ class SpatialRobot:
     def arm_class(self) -> ArmClass:
         """What laws can be for it, by its joints' drives."""
         return arm_class([joint.drive for joint in self.joints])
+
+    def sticking(self, ratio: float) -> SpatialRobot:
+        """The robot whose joints stick when they are simulated, up to a multiple of their Coulomb friction.
+
+        Raises:
+            InputError: the ratio is below 1.
+        """
+        if not ratio >= 1.0:
+            raise InputError("friction", "breakaway", ratio, "at least 1, of the Coulomb friction")
+        joints = (replace(own, friction_breakaway_nm=ratio * own.friction_coulomb_nm) for own in self.joints)
+        return replace(self, joints=tuple(joints))
 
     @property
     def rubs(self) -> bool:
