@@ -20,7 +20,14 @@ from quasilpv.systems.catalogue import system_kind
 EXAMPLES = Path(__file__).parents[3] / "examples"
 ASKED: Mapping[str, tuple[str, dict[str, Any]]] = {
     "two-tanks": ("systems/two_tanks.py:two_tanks", {"decay_rate": 0.05, "input_limits": {"u": 0.006}, "rate_hz": 5.0}),
-    "cart-pole": ("systems/cart_pole.py:cart_pole", {"decay_rate": 1.0, "input_limits": {"u": 60.0}}),
+    "cart-pole": (
+        "systems/cart_pole.py:cart_pole",
+        {"decay_rate": 1.0, "input_limits": {"u": 60.0}, "rate_hz": 1e3, "speed": 22.0},
+    ),
+    "boost": (
+        "systems/boost.py:boost",
+        {"decay_rate": 50.0, "input_limits": {"d": 0.4}, "rate_hz": 1e4, "speed": 1000.0},
+    ),
     "dc-bus": ("own_system.py:dc_bus", {}),
 }
 

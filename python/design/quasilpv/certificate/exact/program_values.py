@@ -1,4 +1,4 @@
-"""Programs of an artifact run on numbers of any kind: doubles, arrays, balls that enclose a range, or polynomials.
+"""Programs of an artifact run on numbers of any kind: doubles, arrays, balls of a range, polynomials, or tangents.
 
 The evaluator of the checker, apart from that of the design (``docs/reference/formats.md``, "Programs").
 """
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from flint import arb
 
+from quasilpv.certificate.exact.tangents import Tangent, power
 from quasilpv.certificate.exact.trigonometric import Polynomial, UnsupportedError
 
 Scalar = Any
@@ -80,7 +81,7 @@ def _unary(name: str) -> Callable[[Scalar], Scalar]:
     def apply(x: Scalar) -> Scalar:
         if isinstance(x, Polynomial) and not hasattr(x, name):
             raise UnsupportedError(f"{name} of an angle or a speed")
-        return getattr(x, name)() if isinstance(x, arb | Polynomial) else getattr(np, name)(x)
+        return getattr(x, name)() if isinstance(x, arb | Polynomial | Tangent) else getattr(np, name)(x)
 
     return apply
 
@@ -95,6 +96,10 @@ _UNARY: Mapping[str, Callable[[Scalar], Scalar]] = {
 }
 
 
+_WITHOUT_SLOPE = frozenset({"min", "max", "log_chord", "sinc", "expm1_quotient", "tanh_quotient"})
+"""Operations whose slope is not built."""
+
+
 def program_values(
     code: Code, angle: Sequence[Scalar] = (), speed: Sequence[Scalar] = (), signal: Sequence[Scalar] = ()
 ) -> list[Scalar]:
@@ -102,23 +107,27 @@ def program_values(
 
     Args:
         code: of a program of an artifact, or of a part of one that leaves values on the stack.
-        angle, speed: n values each, all of one kind: numbers, arrays of one shape, `flint.arb` balls, or polynomials.
+        angle, speed: n values each, all of one kind: numbers, arrays of one shape, `flint.arb` balls, polynomials, or
+            tangents.
         signal: instead of these, values by number.
 
     Raises:
         KeyError: an operation that no premise needs (arcs), or a reference.
-        UnsupportedError: of polynomials, what is none.
+        UnsupportedError: of polynomials, what is none; of tangents, what has no slope here.
     """
     inputs = {"angle": angle, "speed": speed, "signal": signal}
     zero = 0 * (*angle, *signal)[0]
     stack: list[Scalar] = []
     for name, *argument in code:
+        if name in _WITHOUT_SLOPE and isinstance(stack[-1], Tangent):
+            raise UnsupportedError(f"the slope of {name}")
         if name == "const":
             stack.append(zero + float(argument[0]))
         elif name in inputs:
             stack.append(inputs[name][int(argument[0])])
         elif name == "pow_int":
-            stack.append(stack.pop() ** int(argument[0]))
+            base = stack.pop()
+            stack.append(power(base, int(argument[0])) if isinstance(base, arb) else base ** int(argument[0]))
         elif name in _BINARY:
             right = stack.pop()
             stack.append(_BINARY[name](stack.pop(), right))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from quasilpv.certificate.exact.claims import Verification
+from quasilpv.certificate.systems.linearised import LINEARISED, LinearisedLoop
 from quasilpv.certificate.systems.regional import regional_claims
 from quasilpv.certificate.systems.sampled import SampledLoop
 from quasilpv.documents.strict_model import FieldError
@@ -28,7 +29,8 @@ def verify_system(artifact: SystemArtifactDocument, source: str = "artifact") ->
     try:
         claims = tuple(regional_claims(artifact))
         if artifact.sampling is not None:
-            claims = (*claims, SampledLoop(artifact).claim(artifact.sample_period_s))
+            loop = LinearisedLoop if artifact.sampling.get("method") == LINEARISED else SampledLoop
+            claims = (*claims, loop(artifact).claim(artifact.sample_period_s))
     except FieldError as error:
         raise InputError(source, error.field, error.got, error.expected) from error
     except (LookupError, TypeError, ValueError, ArithmeticError) as error:
