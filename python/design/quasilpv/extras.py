@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from quasilpv.errors import InputError
 
-EXTRAS = {"cvxpy": "oracles", "lcm": "hil", "mcap": "hil", "viser": "view"}
+EXTRAS = {"cvxpy": "oracles", "lcm": "hil", "mcap": "hil", "trimesh": "view", "viser": "view"}
 """Module and extra, of `pyproject.toml`. Those not named here are asked for where they are used."""
 
 

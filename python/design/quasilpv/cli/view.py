@@ -18,6 +18,7 @@ from quasilpv.errors import InputError, TransportError
 
 if TYPE_CHECKING:
     from quasilpv.artifact import Artifact
+    from quasilpv.descriptions.meshes import BodyMesh
     from quasilpv.systems.robots.drawing import Drawing
     from quasilpv.view.live import LiveMotion
     from quasilpv.view.page import Page
@@ -39,6 +40,14 @@ def view_command(
         Path | None,
         typer.Option("--scenario", metavar="FILE", help="Live: whose plant is drawn.  [default: the robot's]"),
     ] = None,
+    robot: Annotated[
+        Path | None,
+        typer.Option("--robot", metavar="FILE", help="A robot.toml: the meshes that its URDF names are shown."),
+    ] = None,
+    meshes: Annotated[
+        list[Path] | None,
+        typer.Option("--meshes", metavar="FOLDER", help="Where package:// names lead; may be given several times."),
+    ] = None,
     timeout_s: Annotated[
         float, typer.Option("--timeout-s", min=0.0, max=86400.0, help="Live: wait so long for the first sample.")
     ] = 60.0,
@@ -58,6 +67,7 @@ def view_command(
     \b
     Examples:
       design view --log LAST
+      design view --log LAST --robot ur5.toml --meshes ur_description
       design view --live --artifact out/arm3/artifact.json
     """
     from quasilpv.artifact import read_artifact
@@ -80,7 +90,9 @@ def view_command(
         controller, motion = recorded.artifact, Motion.of_log(recorded)
         mechanism = mechanism_of(recorded.scenario.plant)
         title, source = f"{recorded.scenario.name}, {recorded.header.controller}", shlex.quote(recorded.source)
-    page = Page(Playback(title, motion, mechanism, _disturbance_unit(controller), source), port, listener)
+    bodies = _bodies(robot, meshes or [], mechanism)
+    playback = Playback(title, motion, mechanism, _disturbance_unit(controller), source, bodies)
+    page = Page(playback, port, listener)
     if at is not None:
         page.player.playing = False
         page.player.seek(at)
@@ -89,6 +101,28 @@ def view_command(
         webbrowser.open(page.url)
     print_note("Ctrl-C ends the view")
     _run(page)
+
+
+def _bodies(robot: Path | None, folders: list[Path], mechanism: Drawing) -> tuple[BodyMesh, ...]:
+    from quasilpv.descriptions.meshes import body_meshes
+    from quasilpv.descriptions.robot_file import read_robot_file
+    from quasilpv.systems.robots.tree_mechanism import TreeMechanism
+
+    if robot is None:
+        if folders:
+            raise InputError("command line", "--meshes", str(folders[0]), "--robot FILE beside it")
+        return ()
+    source = read_robot_file(robot)
+    names = [joint.name for joint in source.robot().joints]
+    moved = [joint.name for joint in mechanism.tree.joints] if isinstance(mechanism, TreeMechanism) else []
+    if names != moved:
+        raise InputError(
+            str(robot), "joints", ", ".join(names), f"those of the run: {', '.join(moved) or 'of a plane'}"
+        )
+    found, missing = body_meshes(source, folders)
+    if missing:
+        print_note(f"{len(missing)} meshes are not there or not STL or OBJ, the first is {missing[0]}")
+    return tuple(found)
 
 
 def _run(page: Page) -> None:

@@ -165,6 +165,26 @@ class DescribedTree:
         self.moving(tip, locked)
         return _ChainOf(self, tip, locked, limits or {}).chain()
 
+    def places(
+        self, tip: str, locked: Mapping[str, float], limits: Mapping[str, tuple[float, float]]
+    ) -> dict[str, tuple[int, Placement]]:
+        """For every frame the joint of the chain it moves with (`BASE` for none), and its placement there.
+
+        Args:
+            tip, locked, limits: as for `chain`.
+
+        Raises:
+            InputError: as for `chain`.
+        """
+        merged = _ChainOf(self, tip, locked, limits)
+        merged.chain()
+        moving = [k for k in range(len(self.joints)) if merged.carried_by[k] == k]
+        found = {}
+        for name, (k, place) in self.frames.items():
+            carrier, where = (BASE, place) if k == BASE else (merged.carried_by[k], merged.inside[k].then(place))
+            found[name] = (BASE if carrier == BASE else moving.index(carrier), where)
+        return found
+
 
 @dataclass
 class _ChainOf:

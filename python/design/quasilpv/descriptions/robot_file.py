@@ -175,6 +175,15 @@ class RobotSource:
             source=source,
         )
 
+    def places(self) -> dict[str, tuple[int, Placement]]:
+        """For every link of the description the joint of the robot it moves with (-1: the base), and its place there.
+
+        Raises:
+            InputError: as for `robot`.
+        """
+        limits = {joint.name: joint.angle_rad for joint in self.robot().joints}
+        return self.described.places(self.described.tip(self.stated.tip_link), self.stated.locked, limits)
+
 
 def read_robot_file(path: Path) -> RobotSource:
     """A robot file and its description.

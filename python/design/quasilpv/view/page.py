@@ -155,6 +155,7 @@ class Page:
         with gui.add_folder("show", expand_by_default=False):
             shadow = gui.add_checkbox("robot on its reference", self.scene.show_shadow)
             magnified = gui.add_checkbox("tool path, error magnified", True)
+            skeleton = gui.add_checkbox("robot as bars", not playback.meshes)
         self._share: viser.GuiMarkdownHandle | None = None
         if playback.source:
             with gui.add_folder("share", expand_by_default=False):
@@ -163,10 +164,11 @@ class Page:
         gui.add_html(_legend(playback.motion.angle_rad.shape[1]))
 
         def show(_: object) -> None:
-            self.scene.set_visible(shadow=shadow.value, magnified=magnified.value)
+            self.scene.set_visible(shadow=shadow.value, magnified=magnified.value, skeleton=skeleton.value)
 
         shadow.on_update(show)
         magnified.on_update(show)
+        skeleton.on_update(show)
 
     def _scrub(self, time_s: float) -> None:
         self.player.playing = False

@@ -12,11 +12,13 @@ import numpy.typing as npt
 from quasilpv import _runtime
 from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact
+from quasilpv.descriptions.meshes import BodyMesh
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InputError
 from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.logged import logged_run
 from quasilpv.systems.robots.drawing import Drawing
+from quasilpv.systems.robots.tree_mechanism import TreeMechanism
 from quasilpv.telemetry import RunLog
 from quasilpv.telemetry.codes import STATES, word
 from quasilpv.telemetry.message_types import Records
@@ -134,6 +136,7 @@ class Playback:
         mechanism: whose links are drawn.
         disturbance_unit: of estimate and disturbance.
         source: name of the log, as others may have it; empty of a live run.
+        meshes: of the bodies of a robot in space, drawn in place of its skeleton.
     """
 
     title: str
@@ -141,6 +144,7 @@ class Playback:
     mechanism: Drawing
     disturbance_unit: str
     source: str = ""
+    meshes: tuple[BodyMesh, ...] = ()
 
     @property
     def begin_s(self) -> float:
@@ -173,7 +177,14 @@ class Playback:
             error_m=self.tool_m[k] - self.reference_tool_m[k],
             state=word(STATES, int(self.motion.state[k])),
             flags=int(self.motion.flags[k]),
+            frames=self._frames(self.motion.angle_rad[k]),
         )
+
+    def _frames(self, angle_rad: FloatArray) -> tuple[tuple[FloatArray, FloatArray], ...]:
+        """Rotation and origin of the base's frame and of every joint's, if there is something to put there."""
+        if not self.meshes or not isinstance(self.mechanism, TreeMechanism):
+            return ()
+        return ((np.eye(3), np.zeros(3)), *self.mechanism.tree.frames(angle_rad)[:-1])
 
     def with_motion(self, motion: Motion) -> Playback:
         """The same robot in another motion."""
@@ -192,6 +203,7 @@ class Instant:
         error_m: (2,) or (3,) of the tool.
         state: of the controller, in words.
         flags: fault bits.
+        frames: rotation and origin of base and joints, where meshes are drawn.
     """
 
     sample: int
@@ -201,6 +213,7 @@ class Instant:
     error_m: FloatArray
     state: str
     flags: int
+    frames: tuple[tuple[FloatArray, FloatArray], ...] = ()
 
 
 @dataclass

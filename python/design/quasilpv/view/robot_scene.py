@@ -10,8 +10,10 @@ from typing import TypeAlias
 
 import numpy as np
 import viser
+from viser.transforms import SO3
 
 from quasilpv.arrays import FloatArray
+from quasilpv.descriptions.meshes import BodyMesh
 from quasilpv.figures.space import Viewpoint
 from quasilpv.figures.tracking import exaggeration
 from quasilpv.view.playback import Instant, Playback
@@ -25,6 +27,7 @@ SHADOW_COLOUR, REFERENCE_COLOUR, TOOL_COLOUR, ERROR_COLOUR = (
     (0, 114, 178),
     (213, 94, 0),
 )
+BODY_COLOUR = (176, 190, 204)
 PATH_POINTS = 400
 BEFORE_THE_PLANE = np.array([0.3, -1.2, 0.25])
 """Where the camera starts, from the middle of a planar robot, in parts of its extent."""
@@ -57,6 +60,7 @@ class RobotScene:
         # A link that only ties things together, as the spring of the disc, may have no length at some time.
         width = 0.075 * float(np.max(lengths))
         self.robot = _Bars(scene, "robot", links.shape, width, (LINK_COLOUR, None))
+        self._bodies = [_add_body(scene, mesh) for mesh in playback.meshes]
         self._shadow = _Bars(scene, "reference robot", links.shape, 0.6 * width, (SHADOW_COLOUR, 0.35))
         self._scene = scene
         self._line_width = 0.12 * width
@@ -64,7 +68,7 @@ class RobotScene:
         self._place_camera(server, playback)
         self.show_paths(playback)
         self.show_shadow = self.exaggeration == 1.0
-        self.set_visible(shadow=self.show_shadow, magnified=True)
+        self.set_visible(shadow=self.show_shadow, magnified=True, skeleton=not self._bodies)
 
     def _place_camera(self, server: viser.ViserServer, playback: Playback) -> None:
         count = playback.motion.samples
@@ -124,14 +128,24 @@ class RobotScene:
         """Move everything to an instant."""
         self.robot.move(instant.links_m)
         self._shadow.move(instant.reference_links_m)
+        for joint, body in self._bodies:
+            rotation, origin = instant.frames[joint + 1]
+            body.wxyz, body.position = SO3.from_matrix(rotation).wxyz, _triple(origin)
         drawn = int(np.searchsorted(self._rows, instant.sample, side="right"))
         for handle, segments in self._segments:
             handle.points = segments[: max(drawn - 1, 1)].astype(np.float32)
 
-    def set_visible(self, *, shadow: bool, magnified: bool) -> None:
-        """Show or hide the robot on its reference, and the magnified error."""
+    def set_visible(self, *, shadow: bool, magnified: bool, skeleton: bool = True) -> None:
+        """Show or hide the robot on its reference, the magnified error, and the robot as bars."""
+        self.robot.root.visible = skeleton
         self._shadow.root.visible = shadow
         self._shows_magnified = self._magnified.visible = magnified
+
+
+def _add_body(scene: viser.SceneApi, mesh: BodyMesh) -> tuple[int, viser.MeshHandle]:
+    """The joint that a body moves with, and its mesh in the scene."""
+    name, vertices, faces = f"/bodies/{mesh.link}", mesh.vertices_m.astype(np.float32), mesh.faces.astype(np.uint32)
+    return mesh.joint, scene.add_mesh_simple(name, vertices, faces, color=BODY_COLOUR)
 
 
 class _Bars:
