@@ -14,7 +14,7 @@ PACKAGE = ROOT / "python" / "design" / "quasilpv"
 
 # Every room of the package, lowest layer first. A room imports itself and the layers below its own.
 LAYERS = (
-    {"", "arrays", "defaults", "errors", "progress"},
+    {"", "arrays", "defaults", "errors", "progress", "shown"},
     {"extras", "files"},
     {"documents"},
     {"systems"},

@@ -11,6 +11,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 import quasilpv as ql
@@ -246,5 +247,10 @@ def test_a_notebook_is_shown_numbers_and_nothing_is_drawn_for_it(
 
 
 def test_the_figure_of_a_gate_is_drawn_over_its_delays(proved: ql.Artifact) -> None:
-    figure = ql.gate(proved).plot()
+    found = ql.gate(proved)
+    figure = found.plot()
     assert any("delay" in axes.get_xlabel() for axes in figure.axes)
+    own = Figure()
+    assert found.plot(ax=own.add_subplot()) is own
+    assert "delay" in own.axes[0].get_xlabel()
+    assert "enclosed" in found._repr_html_()

@@ -16,7 +16,6 @@ Nothing is drawn, and no robot assumed, unless it is asked for: the robot of a r
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -51,6 +50,7 @@ from quasilpv.scenarios import (
     tracking_experiment,
     tracking_experiments,
 )
+from quasilpv.shown import html_table
 from quasilpv.synthesis import DEFAULT_CONTROLLER, DesignRequest, specification_for, synthesise
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots import registry
@@ -154,9 +154,14 @@ class GateResult:
         """JSON-able: what ``design robust --json`` prints."""
         return self.found.to_document()
 
-    def plot(self) -> Figure:
-        """The inertia margin, or the growth rates of the grid, over the delay."""
-        return gate_figure(self.found)
+    def plot(self, *, ax: Axes | None = None) -> Figure:
+        """The inertia margin, or the growth rates of the grid, over the delay; into the plot `ax` if there is one."""
+        return gate_figure(self.found, ax)
+
+    def _repr_html_(self) -> str:
+        """The verdict as a table, for notebooks."""
+        rows = {"passed": self.passed, "rests on": self.evidence.value, "delay margin, s": self.delay_margin_s}
+        return html_table(f"gate of {self.name}", rows)
 
     def __repr__(self) -> str:
         """The verdict in a line."""
@@ -221,8 +226,7 @@ class Simulation:
 
     def _repr_html_(self) -> str:
         """The same as a table; no figure is drawn for it."""
-        rows = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in self._numbers().items())
-        return f"<table><caption>{html.escape(self.result.title)}</caption>{rows}</table>"
+        return html_table(self.result.title, self._numbers())
 
     def _numbers(self) -> dict[str, str]:
         metrics = self.metrics
@@ -302,6 +306,11 @@ def verify(artifact: ArtifactLike) -> Verification:
 def gate(artifact: ArtifactLike, *, delay_samples: float | None = None) -> GateResult:
     """Ask whether the frozen loop of an artifact is stable in every posture, with every payload and small delay.
 
+    >>> import quasilpv as ql
+    >>> found = ql.gate(ql.design("arm2", rate_hz=1000).release())
+    >>> found.passed, str(found.evidence)
+    (True, 'enclosed')
+
     Args:
         artifact: an artifact, or a file that holds one.
         delay_samples: the transport delay it has to tolerate; half a sample by default.
@@ -330,6 +339,11 @@ def simulate(
     folder: Path | str | None = None,
 ) -> Simulation:
     """Run a controller in closed loop: the C++ runtime against the simulated robot, in this process.
+
+    >>> import quasilpv as ql
+    >>> run = ql.simulate(ql.design("arm3", law="ctc").release(), "serial-square", plant="nominal")
+    >>> run.metrics.rms_x_m < 0.1
+    True
 
     Args:
         artifact: the controller, or a file that holds it.

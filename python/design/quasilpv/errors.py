@@ -20,7 +20,13 @@ class QuasilpvError(Exception):
 
 
 class InputError(QuasilpvError):
-    """A value given by the user cannot be used."""
+    """A value given by the user cannot be used.
+
+    >>> import quasilpv as ql
+    >>> ql.solve("ex-I.1", "II.66")
+    Traceback (most recent call last):
+    quasilpv.errors.InputError: ...
+    """
 
     def __init__(self, source: str, field: str, got: object, expected: str) -> None:
         """Compose the one-line message ``source: field: got ..., expected ...``.

@@ -35,6 +35,13 @@ FORMATS = ("npz", "mat", "json")
 def export(what: Exportable, path: Path | str, form: str | None = None) -> Path:
     """Write the gains of a law or an artifact, and the model where there is one, for other tools.
 
+    >>> import quasilpv as ql
+    >>> from tempfile import TemporaryDirectory
+    >>> answer = ql.solve("ex-I.1", "II.6", parameters={"b": 2.5})
+    >>> with TemporaryDirectory() as folder:
+    ...     ql.export(answer.law, f"{folder}/law.npz").suffix
+    '.npz'
+
     Args:
         what: the law of an answer, a controller of a system, or an artifact.
         path: of the file.
@@ -74,6 +81,14 @@ def state_space(
     what: SystemController | SystemArtifactDocument, premises: Mapping[str, float], *, closed: bool = False
 ) -> Any:
     """The system at one premise vector, as `control.StateSpace` from u to x_d, algebraic states eliminated.
+
+    >>> import quasilpv as ql
+    >>> pendulum = ql.DescriptorSystem.from_equations(
+    ...     ["x' = v", "v' = 9.81*sin(x) + u"], state="x v", inputs="u", domain={"x": (-1, 1), "v": (-3, 3)}
+    ... )
+    >>> found = ql.stabilise(pendulum, decay_rate=1.0, input_limits={"u": 30.0})
+    >>> ql.state_space(found, {"z1": 9.81}, closed=True).nstates
+    2
 
     Args:
         what: a controller of a system.

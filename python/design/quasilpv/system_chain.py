@@ -16,12 +16,12 @@ True
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from quasilpv.artifact.system_store import read_system_artifact, system_summary, write_system_artifact
@@ -30,7 +30,9 @@ from quasilpv.certificate.systems import verify_system
 from quasilpv.documents.system_artifact import SystemArtifactDocument
 from quasilpv.errors import InputError, one_of
 from quasilpv.experiments.system_run import SystemExperiment, SystemRun, simulate
-from quasilpv.figures.systems import region_figure, signals_figure
+from quasilpv.figures.style import style
+from quasilpv.figures.systems import draw_region, region_figure, signals_figure
+from quasilpv.shown import html_table
 from quasilpv.synthesis.regional.request import Objective, RegionalRequest
 from quasilpv.system_release import release_system
 from quasilpv.systems.own_kind import SystemLike, own_kind
@@ -66,15 +68,25 @@ class SystemSimulation:
         """Whether V never exceeded its start, and no state left its domain."""
         return self.run.stayed
 
-    def plot(self, name: str = "signals") -> Figure:
+    def plot(self, name: str = "signals", *, ax: Axes | None = None) -> Figure:
         """A figure: ``signals`` with their limits, or ``region`` with the run in it.
 
+        Args:
+            name: of the figure.
+            ax: draw into this plot, the reader's own: of the region in the plane of the first two states.
+
         Raises:
-            InputError: there is none of this name.
+            InputError: there is none of this name, or it does not fit into one plot.
         """
         if name not in FIGURES:
             raise InputError("plot", "name", name, one_of(FIGURES, name))
-        return FIGURES[name](self.run)
+        if ax is None:
+            return FIGURES[name](self.run)
+        if name != "region":
+            raise InputError("plot", "ax", f"one plot for {name}", "region")
+        with style():
+            draw_region(ax, self.run)
+        return ax.figure.figure
 
     def __repr__(self) -> str:
         """In a few lines."""
@@ -149,18 +161,26 @@ class SystemController:
     def _repr_html_(self) -> str:
         """A table, for notebooks."""
         found = self.summary()
-        rows = [
-            ("law", found["law"]),
-            ("region", found["region_reach"]),
-            ("decay rate, 1/s", found["decay_rate_per_s"]),
-        ]
-        rows += [("sampling period, s", found["sample_period_s"]), ("inputs", found["inputs"])]
-        cells = "".join(f"<tr><th>{html.escape(a)}</th><td>{html.escape(_shown(b))}</td></tr>" for a, b in rows)
-        return f"<table><caption>{html.escape(found['name'])}</caption>{cells}</table>"
+        names = {
+            "law": "law",
+            "region_reach": "region",
+            "decay_rate_per_s": "decay rate, 1/s",
+            "sample_period_s": "sampling period, s",
+            "inputs": "inputs",
+        }
+        return html_table(found["name"], {name: _shown(found[key]) for key, name in names.items()})
 
 
 def stabilise(system: SystemLike, **options: Unpack[StabiliseOptions]) -> SystemController:
     """A feedback for a general system, with the region inside its domain that no solution leaves.
+
+    >>> import quasilpv as ql
+    >>> pendulum = ql.DescriptorSystem.from_equations(
+    ...     ["x' = v", "v' = 9.81*sin(x) + u"], state="x v", inputs="u", domain={"x": (-1, 1), "v": (-3, 3)}
+    ... )
+    >>> found = ql.stabilise(pendulum, decay_rate=1.0, input_limits={"u": 30.0})
+    >>> found.verify().verified
+    True
 
     Args:
         system: a `DescriptorSystem`, a function of parameters that makes one, or a reference as on the command line.
@@ -186,6 +206,16 @@ def stabilise(system: SystemLike, **options: Unpack[StabiliseOptions]) -> System
 
 def controller(path: Path | str) -> SystemController:
     """A controller from the file of its artifact, either twin.
+
+    >>> import quasilpv as ql
+    >>> pendulum = ql.DescriptorSystem.from_equations(
+    ...     ["x' = v", "v' = 9.81*sin(x) + u"], state="x v", inputs="u", domain={"x": (-1, 1), "v": (-3, 3)}
+    ... )
+    >>> found = ql.stabilise(pendulum, decay_rate=1.0, input_limits={"u": 30.0})
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     ql.controller(found.write(folder)).verify().verified
+    True
 
     Raises:
         InputError: it is none of a general system.

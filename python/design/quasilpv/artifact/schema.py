@@ -17,10 +17,17 @@ from quasilpv.documents.artifact import ArtifactDocument
 from quasilpv.documents.law import PROGRAM_INPUTS
 from quasilpv.documents.strict_model import FieldError, validate
 from quasilpv.documents.tables import PolytopeTable, require_size
+from quasilpv.shown import html_table
 
 
 class Artifact(ArtifactDocument[Law]):
-    """One controller, immutable and consistent: a constructed artifact satisfies every rule of the format."""
+    """One controller, immutable and consistent: a constructed artifact satisfies every rule of the format.
+
+    >>> import quasilpv as ql
+    >>> artifact = ql.design("arm3", law="ctc").release()
+    >>> isinstance(artifact, ql.Artifact), artifact.name
+    (True, 'arm3-ctc-1000hz')
+    """
 
     def __repr__(self) -> str:
         """What it is, in a few lines; `content` has all of it."""
@@ -36,6 +43,17 @@ class Artifact(ArtifactDocument[Law]):
     def __str__(self) -> str:
         """The same."""
         return repr(self)
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for notebooks."""
+        rows = {
+            "law": self.law.kind,
+            "robot": f"{self.robot.id}, {self.joints} joints",
+            "rate, Hz": f"{1.0 / self.sample_period_s:g}",
+            "verification": "nothing" if self.verification is None else ", ".join(self.verification),
+            "hash": self.hash,
+        }
+        return html_table(self.name, rows)
 
     @classmethod
     def from_document(cls, document: Mapping[str, object], source: str = "artifact") -> Artifact:

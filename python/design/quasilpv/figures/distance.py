@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from quasilpv.certificate.gate.elastic import ElasticGate
 from quasilpv.certificate.gate.two_mass import TwoMassExclusion
-from quasilpv.figures.style import BLUE, VERMILION, new_figure, style
+from quasilpv.figures.style import BLUE, VERMILION, legend_of_one_plot, one_plot, style
 
 POINTS = 400
 LOWEST_SHARE = 1e-3
 
 
-def distance_figure(gate: ElasticGate) -> Figure:
+def distance_figure(gate: ElasticGate, ax: Axes | None = None) -> Figure:
     """Distance of what a root needs from what the arms of the set have, over the frequency; no curve without a set.
 
     The gate passes if it is positive at every frequency; cells prove it, the points of the curve do not.
 
     Args:
         gate: the verdict.
+        ax: draw into this plot.
     """
     rate = 1.0 / gate.loop.sample_period_s
     with style():
-        figure = new_figure(3.8, f"Exclusion of roots on the unit circle at {rate:g} Hz (numerical)")
-        axes = figure.subplots()
+        figure, axes = one_plot(3.8, f"Exclusion of roots on the unit circle at {rate:g} Hz (numerical)", ax)
         if gate.plants is not None:
             rates = np.geomspace(LOWEST_SHARE, 1.0, POINTS) * np.pi * rate * (1.0 - 1e-12)
             left = TwoMassExclusion(gate.loop, gate.plants).distances(rates)
@@ -35,5 +36,5 @@ def distance_figure(gate: ElasticGate) -> Figure:
         axes.set_yscale("log")
         axes.set_xlabel("frequency (rad/s)")
         axes.set_ylabel("distance, relative")
-        figure.legend(loc="outside lower center", ncols=2, handlelength=2.2)
+        legend_of_one_plot(figure, axes, 2, is_own=ax is None)
         return figure

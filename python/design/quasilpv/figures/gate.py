@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from flint import fmpq
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from quasilpv.certificate import Gate
@@ -17,13 +18,13 @@ BEYOND_THE_MARGIN = fmpq(3, 2)
 SHORTEST_CURVE_SAMPLES = fmpq(1)
 
 
-def gate_figure(found: Gate) -> Figure:
+def gate_figure(found: Gate, ax: Axes | None = None) -> Figure:
     """What a gate found: growth rates or the inertia margin over the delay; distances over the frequency."""
     if isinstance(found, ElasticGate):
-        return distance_figure(found)
+        return distance_figure(found, ax)
     if isinstance(found, GridGate):
-        return growth_figure(found, growth_curves(found))
-    return margin_figure(found, margin_curve(found.loop, _longest_delay(found), lag_samples=found.lag[1]))
+        return growth_figure(found, growth_curves(found), ax)
+    return margin_figure(found, margin_curve(found.loop, _longest_delay(found), lag_samples=found.lag[1]), ax)
 
 
 def _longest_delay(gate: RobustGate) -> fmpq:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from quasilpv.certificate.gate.grid import GridGate, GrowthCurve
-from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, new_figure, style
+from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, legend_of_one_plot, one_plot, style
 
 _COLOURS = (GREEN, BLUE, VERMILION)
 _TICKS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0)
 
 
-def growth_figure(gate: GridGate, curves: Sequence[GrowthCurve]) -> Figure:
+def growth_figure(gate: GridGate, curves: Sequence[GrowthCurve], ax: Axes | None = None) -> Figure:
     """Worst growth rate against a common factor on all true inertias, one curve per transport delay.
 
     The gate passes if the curves of no delay and of the specified delay are below zero at factor 1. The shaded factors
@@ -23,13 +24,12 @@ def growth_figure(gate: GridGate, curves: Sequence[GrowthCurve]) -> Figure:
     Args:
         gate: what it found.
         curves: of `growth_curves`, the shortest delay first.
+        ax: draw into this plot.
     """
     with style():
         period = gate.plants.law.sample_period_s
-        figure = new_figure(
-            3.8, f"Worst growth rate of the frozen loop over the grid at {1.0 / period:g} Hz (no proof)"
-        )
-        axes = figure.subplots()
+        title = f"Worst growth rate of the frozen loop over the grid at {1.0 / period:g} Hz (no proof)"
+        figure, axes = one_plot(3.8, title, ax)
         if gate.factors is not None:
             axes.axvspan(*gate.factors, color=ORANGE, alpha=0.2, linewidth=0, label="stable at the specified delay")
         for curve, colour in zip(curves, _COLOURS, strict=True):
@@ -46,5 +46,5 @@ def growth_figure(gate: GridGate, curves: Sequence[GrowthCurve]) -> Figure:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.set_xlabel("factor on the true inertia of every configuration and payload")
         axes.set_ylabel("worst growth rate (1/s)")
-        figure.legend(loc="outside lower center", ncols=2, handlelength=2.2)
+        legend_of_one_plot(figure, axes, 2, is_own=ax is None)
         return figure

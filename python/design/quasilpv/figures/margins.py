@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 
 from quasilpv.certificate.exact.rationals import to_float
 from quasilpv.certificate.gate.proof import MarginCurve, RobustGate
-from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, new_figure, style
+from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, legend_of_one_plot, one_plot, style
 
 _TICKS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 
 
-def margin_figure(gate: RobustGate, curve: MarginCurve) -> Figure:
+def margin_figure(gate: RobustGate, curve: MarginCurve, ax: Axes | None = None) -> Figure:
     """Inertia margin against transport delay, with the needed range, the specified delay and the delay margin.
 
     The gate passes if the band of needed ratios lies in the stable region from no delay to the specified one.
@@ -25,11 +25,11 @@ def margin_figure(gate: RobustGate, curve: MarginCurve) -> Figure:
     Args:
         gate: the verdict.
         curve: the margin at a series of delays, from 0 to beyond the delay margin.
+        ax: draw into this plot.
     """
     with style():
         rate = 1.0 / gate.loop.sample_period_s
-        figure = new_figure(3.8, f"Inertia margin of the frozen loop at {rate:g} Hz{_lag(gate)}")
-        axes = figure.subplots()
+        figure, axes = one_plot(3.8, f"Inertia margin of the frozen loop at {rate:g} Hz{_lag(gate)}", ax)
         _plot_margin(axes, curve)
         if gate.needed is not None:
             low, high = gate.needed.to_floats()
@@ -41,7 +41,7 @@ def margin_figure(gate: RobustGate, curve: MarginCurve) -> Figure:
         if gate.delay_margin_s is not None:
             axes.axvline(gate.delay_margin_s * 1e3, color=VERMILION, label="delay margin (proved)")
         _label(axes, curve, rate)
-        figure.legend(loc="outside lower center", ncols=3, handlelength=2.2)
+        legend_of_one_plot(figure, axes, 3, is_own=ax is None)
         return figure
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, style
+from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, one_plot, style
 from quasilpv.studies.answer import Evidence, Verdict
 from quasilpv.studies.question import Question
 from quasilpv.studies.region import Rectangle, Region
@@ -23,9 +23,15 @@ PROVED_LOOK = {"facecolor": SKY, "edgecolor": BLUE, "alpha": 0.6}
 UNDECIDED_LOOK = {"facecolor": "none", "edgecolor": ORANGE, "hatch": "/////"}
 
 
-def plot_region(*maps: Region, title: str | None = None) -> Figure:
-    """One map of `quasilpv.region`, or several over the same axes, as a figure; see `region_figure`."""
-    return region_figure(maps, title)
+def plot_region(*maps: Region, title: str | None = None, ax: Axes | None = None) -> Figure:
+    """One map of `quasilpv.region`, or several over the same axes; see `region_figure`.
+
+    >>> import quasilpv as ql
+    >>> found = ql.region("ex-I.1", "II.6", ("a", -8.0, 8.0, 3), ("b", -20.0, 20.0, 3))
+    >>> ql.plot_region(found).axes[0].get_xlabel()
+    'a, parameter of ex-I.1'
+    """
+    return region_figure(maps, title, ax=ax)
 
 
 def region_figure(
@@ -34,6 +40,7 @@ def region_figure(
     *,
     labels: Sequence[str] = (),
     axis_labels: tuple[str, str] | None = None,
+    ax: Axes | None = None,
 ) -> Figure:
     """One or several maps over the same axes.
 
@@ -45,14 +52,14 @@ def region_figure(
         title: default: system and condition of the first.
         labels: of several maps; default: condition, representation and number of feasible points.
         axis_labels: default: the names of the two parameters, and whose they are.
+        ax: draw into this plot.
     """
     first = regions[0]
     names = labels or [_label(region) for region in regions]
     whose = f"parameter of {system_kind(first.question.system).stem}"
     x_label, y_label = axis_labels or (f"{first.x.name}, {whose}", f"{first.y.name}, {whose}")
     with style():
-        figure = new_figure(4.2, title or _title(first.question))
-        axes = figure.add_subplot()
+        figure, axes = one_plot(4.2, title or _title(first.question), ax)
         if len(regions) == 1:
             _verdicts(axes, first)
         else:
@@ -61,7 +68,8 @@ def region_figure(
         axes.set_xlabel(x_label)
         axes.set_ylabel(y_label)
         _frame(axes, first)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+        beside = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
+        axes.legend(**(beside if ax is None else {}))
     return figure
 
 

@@ -111,6 +111,23 @@ def new_figure(height_in: float, title: str) -> Figure:
     return figure
 
 
+def one_plot(height_in: float, title: str, axes: Axes | None) -> tuple[Figure, Axes]:
+    """A figure of one plot; or the plot of a caller, which gets the title."""
+    if axes is None:
+        figure = new_figure(height_in, title)
+        return figure, figure.subplots()
+    axes.set_title(title)
+    return axes.figure.figure, axes
+
+
+def legend_of_one_plot(figure: Figure, axes: Axes, columns: int, *, is_own: bool) -> None:
+    """The legend below the plot of a figure of `one_plot`, or inside the plot of a caller."""
+    if is_own:
+        figure.legend(loc="outside lower center", ncols=columns, handlelength=2.2)
+    else:
+        axes.legend()
+
+
 def legend_above(axes: Axes, columns: int = 4) -> None:
     """The legend of ``axes``, above the plot on its right, where it covers no data."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, handlelength=2.2)

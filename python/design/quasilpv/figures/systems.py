@@ -81,6 +81,13 @@ def region_figure(run: SystemRun) -> Figure:
         return figure
 
 
+def draw_region(axes: Axes, run: SystemRun) -> None:
+    """The same in the plane of the first two differential states, into a plot."""
+    pair = (0, min(1, run.artifact.model.differential - 1))
+    _plane(axes, run, np.array(run.artifact.region.lyapunov), pair)
+    axes.legend()
+
+
 def _plane(axes: Axes, run: SystemRun, P: FloatArray, pair: tuple[int, int]) -> None:
     i, j = pair
     states = run.artifact.states

@@ -8,12 +8,18 @@ from typing import Any
 
 from quasilpv.conditions.reliance import Reliance, Relied, Status
 from quasilpv.polytopes.units import Units
+from quasilpv.shown import html_table
 from quasilpv.studies.law import Law
 from quasilpv.studies.refutation import Refutation
 
 
 class Verdict(StrEnum):
-    """Whether a solution exists. `UNKNOWN` is no weak form of the others: nothing was found out."""
+    """Whether a solution exists. `UNKNOWN` is no weak form of the others: nothing was found out.
+
+    >>> import quasilpv as ql
+    >>> ql.solve("ex-I.1", "II.6", parameters={"b": 2.5}).verdict is ql.Verdict.FEASIBLE
+    True
+    """
 
     FEASIBLE = "feasible"
     INFEASIBLE = "infeasible"
@@ -21,7 +27,12 @@ class Verdict(StrEnum):
 
 
 class Evidence(StrEnum):
-    """What a verdict rests on."""
+    """What a verdict rests on.
+
+    >>> import quasilpv as ql
+    >>> [str(kind) for kind in ql.Evidence]
+    ['proved', 'numerical']
+    """
 
     PROVED = "proved"
     """Exact arithmetic: a solution that was checked, or a mode that refutes all of them."""
@@ -32,6 +43,11 @@ class Evidence(StrEnum):
 @dataclass(frozen=True, repr=False)
 class Answer:
     """What is known about a question.
+
+    >>> import quasilpv as ql
+    >>> answer = ql.solve("ex-I.1", "II.6", parameters={"b": 2.5})
+    >>> answer.headline, answer.reason
+    ('feasible, proved', 'a solution satisfies every inequality, in exact arithmetic')
 
     Attributes:
         verdict: feasible, infeasible or unknown. A feasible one is always proved.
@@ -87,6 +103,14 @@ class Answer:
         if self.law is not None:
             lines.append(f"law: {self.law!r}".replace("\n", "\n     "))
         return "\n".join([*lines, f"{self.unknowns} unknowns, {self.rows} rows, {self.seconds:.3f} s"])
+
+    def _repr_html_(self) -> str:
+        """A table, for notebooks."""
+        rows: dict[str, object] = {"because": self.reason}
+        if self.law is not None:
+            rows["law"] = f"{self.law.condition} for {self.law.system}: {', '.join(self.law.inputs)}"
+        rows |= {"unknowns": self.unknowns, "rows": self.rows, "time, s": f"{self.seconds:.3f}"}
+        return html_table(self.headline, rows)
 
     def to_document(self) -> dict[str, Any]:
         """JSON-able, without the law."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from quasilpv.defaults import RELATIVE_TOLERANCE
 from quasilpv.errors import InputError
+from quasilpv.shown import html_table
 from quasilpv.studies.answer import Answer, Evidence, Verdict
 from quasilpv.studies.question import Question
 from quasilpv.studies.sweep import Sweep
@@ -50,6 +51,16 @@ class Boundary:
         if self.certified_up_to is None or self.infeasible_from is None:
             return self.certified_up_to if self.infeasible_from is None else None
         return 0.5 * (self.certified_up_to + self.infeasible_from)
+
+    def _repr_html_(self) -> str:
+        """A table, for notebooks."""
+        evidence = "" if self.infeasible_evidence is None else f", {self.infeasible_evidence.value}"
+        rows = {
+            "feasible, proved, up to": self.certified_up_to,
+            f"infeasible{evidence}, from": self.infeasible_from,
+            "points solved": self.evaluations,
+        }
+        return html_table(f"boundary at {self.value:.6g}" if self.value is not None else "no boundary", rows)
 
     def to_document(self) -> dict[str, Any]:
         """JSON-able."""

@@ -41,6 +41,10 @@ class QuestionOptions(TypedDict, total=False):
 def solve(system: SystemLike, condition: str, **options: Unpack[QuestionOptions]) -> Answer:
     """Whether a condition holds for a system, with how sure, why, and the law of the solution.
 
+    >>> import quasilpv as ql
+    >>> ql.solve("ex-I.1", "II.6", parameters={"b": 2.5}).headline
+    'feasible, proved'
+
     Args:
         system: a `DescriptorSystem`, a function of parameters with defaults that makes one, or a name: one of the
             catalogue, ``FILE.py:NAME``, an entry point.
@@ -65,6 +69,11 @@ def boundary(
 ) -> Boundary:
     """Where a condition stops being feasible along one parameter, by bisection.
 
+    >>> import quasilpv as ql
+    >>> edge = ql.boundary("ex-I.1", "II.6", ("b", 0.0, 30.0), parameters={"a": 1.0})
+    >>> f"{edge.value:.3f}"
+    '2.700'
+
     Args:
         system, condition, options: as for `solve`.
         over: name of the parameter and the two ends of its range, e.g. ``("b", 0.0, 30.0)``.
@@ -87,6 +96,11 @@ def region(
     **options: Unpack[QuestionOptions],
 ) -> Region:
     """A map of where a condition is feasible over two parameters.
+
+    >>> import quasilpv as ql
+    >>> found = ql.region("ex-I.1", "II.6", ("a", -8.0, 8.0, 5), ("b", -20.0, 20.0, 5))
+    >>> f"{found.areas.proved_share:.0%} proved"
+    '75% proved'
 
     Of areas, each proved by one solution, where the data are affine in both; of points elsewhere, and then nothing is
     known between them (`Region.areas` is None).

@@ -19,6 +19,11 @@ from quasilpv.systems.descriptor.system import DescriptorSystem
 class Law:
     """What a solution of a condition gives, for one system in the units its author chose.
 
+    >>> import quasilpv as ql
+    >>> law = ql.solve("ex-I.1", "II.6", parameters={"b": 2.5}).law
+    >>> law.gain([0.0, 0.0, 0.0]).shape  # u = K(z) x at one premise vector
+    (1, 2)
+
     Attributes:
         system: its name.
         condition: the id of the condition.

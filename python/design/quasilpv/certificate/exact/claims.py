@@ -12,6 +12,7 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 from quasilpv.certificate.exact.matrices import is_positive_definite
+from quasilpv.shown import html_table
 
 
 class Evidence(StrEnum):
@@ -136,6 +137,16 @@ class Verification:
         word = "verified" if self.verified else f"NOT verified: {', '.join(self.failed[:3]) or 'no claim'}"
         found = f"{len(self.claims)} inequalities, {self.evidence_in_words}" if self.claims else "nothing"
         return f"Verification({word}; {found}; worst margin {self.worst_margin:.3g})"
+
+    def _repr_html_(self) -> str:
+        """The verdict as a table, for notebooks."""
+        rows = {
+            "inequalities": len(self.claims),
+            "rest on": self.evidence_in_words,
+            "worst margin": f"{self.worst_margin:.3g}",
+            "do not hold": ", ".join(self.failed[:3]) or "none",
+        }
+        return html_table("verified" if self.verified else "NOT verified", rows)
 
     @property
     def verified(self) -> bool:

@@ -12,6 +12,7 @@ import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
 from quasilpv.errors import InputError
+from quasilpv.shown import html_table
 from quasilpv.systems.descriptor.names import symbol
 from quasilpv.systems.descriptor.premise import AffineMatrix, Premise
 
@@ -98,6 +99,19 @@ class AffineSystem:
             shown.append(f"  constant disturbance of at most {max(map(abs, self.disturbance)):.2g}, in no verdict")
         inputs = ", ".join(self.inputs) or "none"
         return "\n".join([f"{self.name}: {kinds} states {names}; inputs {inputs}", *shown])
+
+    def _repr_html_(self) -> str:
+        """Sizes and premises as a table, for notebooks."""
+        rows: dict[str, object] = {
+            "states": ", ".join(symbol.name for symbol in self.state),
+            "of these algebraic": self.order - self.differential,
+            "inputs": ", ".join(self.inputs) or "none",
+        }
+        for p in self.premises[:SHOWN_PREMISES]:
+            rows[p.name] = f"{p.expression} in [{p.lower:.4g}, {p.upper:.4g}], {p.kind.value}"
+        if len(self.premises) > SHOWN_PREMISES:
+            rows["and"] = f"{len(self.premises) - SHOWN_PREMISES} more premises"
+        return html_table(self.name, rows)
 
     def __getstate__(self) -> dict[str, Any]:
         """The parts only: compiled functions of them do not travel between processes."""

@@ -32,5 +32,10 @@ def symbol(name: Name) -> sp.Symbol:
 
 
 def rate(state: Name) -> sp.Symbol:
-    """The symbol that stands for the time derivative of a state in an equation."""
+    """The symbol that stands for the time derivative of a state in an equation.
+
+    >>> import quasilpv as ql
+    >>> ql.rate("x")
+    x'
+    """
     return sp.Symbol(f"{symbol(state).name}'", real=True)

@@ -109,7 +109,15 @@ class StructureReport:
 
 
 def structure_report(system: DescriptorSystem) -> StructureReport:
-    """Prove what can be proved of the structure of a system. Nothing here is decided by samples or rounding."""
+    """Prove what can be proved of the structure of a system. Nothing here is decided by samples or rounding.
+
+    >>> import quasilpv as ql
+    >>> pendulum = ql.DescriptorSystem.from_equations(
+    ...     ["x' = w", "w' = 9.81*sin(x) + u"], state="x w", inputs="u", domain={"x": (-1, 1)}
+    ... )
+    >>> str(ql.structure_report(pendulum).verdict)
+    'regular'
+    """
     q = system.differential
     return StructureReport(
         system.name,

@@ -29,6 +29,13 @@ from quasilpv.systems.descriptor.vocabulary import Bounds, Formula, SymbolicMatr
 class DescriptorSystem(AffineSystem):
     """``E(z) x' = A(z) x + B(z) u``, ``y = C(z) x``, made from matrices, equations or rules.
 
+    >>> import quasilpv as ql
+    >>> ql.DescriptorSystem.from_equations(
+    ...     ["x' = w", "w' = 9.81*sin(x) + u"], state="x w", inputs="u", domain={"x": (-1, 1)}, name="pendulum"
+    ... )
+    pendulum: 2 states x, w; inputs u
+      z1 in [0.8415, 1], measured
+
     What it consists of, and what is read off it: `AffineSystem`.
     """
 

@@ -68,6 +68,10 @@ def all_robots() -> tuple[AnyRobot, ...]:
 def any_robot(name: str) -> AnyRobot:
     """The robot of that name, in the plane or in space.
 
+    >>> import quasilpv as ql
+    >>> ql.robot("ur5").id
+    'ur5'
+
     Raises:
         InputError: there is none; the message lists those there are.
     """
