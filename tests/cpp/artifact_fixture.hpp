@@ -299,9 +299,20 @@ inline Json law_table(const std::string& kind, const TestArm& arm) {
                 {"rotor_inertia_kg_m2", repeated(0.5)},
                 {"stiffness_nm_rad", repeated(2e4)},
                 {"correction_bandwidth_rad_s", 3.0},
+                {"correction_source", "motor-torque"},
                 {"friction_viscous_nm_s", repeated(0.5)},
                 {"friction_coulomb_nm", repeated(1.0)},
                 {"dead_zone_rad", 2e-5}});
+  } else if (kind == "link-damped") {  // likewise
+    law.update({{"feedback", {{"kp", -225.0}, {"kd", -30.0}, {"ki", 0.0}}},
+                {"observer", {0.9, 600.0, 150000.0, 1.5e7}},
+                {"filter_time_constant_s", 0.01},
+                {"inertia_scale", 0.8},
+                {"rotor_inertia_kg_m2", repeated(0.5)},
+                {"stiffness_nm_rad", repeated(2e4)},
+                {"relative_damping_nm_s", repeated(60.0)},
+                {"friction_viscous_nm_s", repeated(0.5)},
+                {"friction_coulomb_nm", repeated(1.0)}});
   } else {
     law.update({{"gp", repeated(1200.0)},
                 {"gd", repeated(60.0)},
@@ -349,7 +360,7 @@ inline Json artifact_table(const std::string& kind, int joints) {
 }
 
 /// The kinds of laws whose design inertia may be a chain of bodies.
-inline constexpr const char* kChainLaws[] = {"dob-acceleration", "pid", "ctc", "ctc-dob", "motor-pid"};
+inline constexpr const char* kChainLaws[] = {"dob-acceleration", "pid", "ctc", "ctc-dob", "motor-pid", "link-damped"};
 
 /// The same artifact for a robot in space: a chain of bodies about axes in turn, with a load for its gravity only.
 inline Json with_chain(Json document) {

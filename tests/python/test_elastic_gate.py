@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
-from flint import arb, ctx, fmpq
+from flint import acb, arb, ctx, fmpq
 
 from quasilpv.arrays import FloatArray
 from quasilpv.artifact import Artifact
@@ -17,13 +17,13 @@ from quasilpv.certificate import gate, verify
 from quasilpv.certificate.exact.matrices import rational
 from quasilpv.certificate.gate.elastic import WHAT, ElasticGate
 from quasilpv.certificate.gate.exclusion import Cell
-from quasilpv.certificate.gate.motor_loop import MotorLoopData, OneJoint
+from quasilpv.certificate.gate.motor_loop import CorrectionSource, MotorLoopData, OneJoint
 from quasilpv.certificate.gate.two_mass import BITS, ElasticSet, Exclusion, TwoMassExclusion, _aliases, _Enclosed
 from quasilpv.cli.robust import _answer
 from quasilpv.conditions.tracking.sampled_chains import observer_gains
 from quasilpv.errors import InputError
 from quasilpv.figures.gate import gate_figure
-from quasilpv.loops.elastic_loop import ElasticPlant, MotorLaw, growth_rate
+from quasilpv.loops.elastic_loop import ElasticPlant, MotorLaw, growth_rate, loop_matrix
 from quasilpv.release import checked_artifact
 from quasilpv.synthesis import DesignRequest, synthesise
 from quasilpv.synthesis.elastic import motor_pid
@@ -31,6 +31,7 @@ from quasilpv.synthesis.elastic.motor_pid import Gains
 from reference.elastic_robots import elastic_ur5
 
 T = 1e-3
+SOURCES: tuple[CorrectionSource, ...] = get_args(CorrectionSource)
 QUICK_LAWS, ALL_LAWS = 14, 200
 QUICK_CELLS = 3000
 
@@ -44,14 +45,8 @@ def data_of(law: MotorLaw) -> MotorLoopData:
     def numbers(values: FloatArray) -> Any:
         return tuple(float(value) for value in values)
 
-    return MotorLoopData(
-        T,
-        numbers(law.feedback),
-        numbers(law.observer),
-        law.correction_rad_s,
-        numbers(law.rotors),
-        numbers(law.stiffness),
-    )
+    arms = numbers(law.rotors), numbers(law.stiffness)
+    return MotorLoopData(T, numbers(law.feedback), numbers(law.observer), law.correction_rad_s, *arms, law.source)
 
 
 def samples(interval: tuple[float, float], unit: float = 1.0) -> tuple[fmpq, fmpq]:
@@ -82,20 +77,26 @@ def test_when_the_law_is_written_as_polynomials_expect_the_transfer_function_of_
         assert abs(found / T**2 - expected) < 1e-9 * abs(expected)
 
 
-@pytest.mark.parametrize(("delay", "lag"), [(0.0, 0.0), (0.5, 0.0), (1.25, 0.7)])
-def test_when_one_joint_is_a_matrix_of_balls_expect_the_growth_rate_of_the_loop_in_doubles(
-    delay: float, lag: float
+@pytest.mark.parametrize(
+    ("delay", "lag", "source"),
+    [(0.0, 0.0, "motor-torque"), (0.5, 0.0, "deflection"), (1.25, 0.7, "motor-torque"), (1.25, 0.7, "joint-torque")],
+)
+def test_when_one_joint_is_a_matrix_of_balls_expect_the_polynomial_of_the_loop_in_doubles(
+    delay: float, lag: float, source: CorrectionSource
 ) -> None:
-    law = law_of(Gains(250.0, 45.0, 4.0, 1100.0), np.array([0.5]), np.array([2e4]))
+    law = replace(law_of(Gains(250.0, 45.0, 4.0, 1100.0), np.array([0.5]), np.array([2e4])), source=source)
     data = data_of(law)
     one = OneJoint(rational(3.0), rational(30.0), rational(0.2), rational(delay), rational(lag))
-    with ctx.workprec(200):
-        loop = data.loop(one, data.windings[0], data.correction_poles[0])
-        entries = np.array([[float(loop[i, j].mid()) for j in range(loop.ncols())] for i in range(loop.nrows())])
     K = 0.5 / (30.0 * T**2)
     plant = ElasticPlant(np.array([[1.5]]), np.array([0.5]), np.array([K]), np.array([0.2 * T * K]), lag * T)
-    expected = growth_rate(law, plant, delay * T)
-    assert math.log(np.abs(np.linalg.eigvals(entries)).max()) / T == pytest.approx(expected, rel=1e-6)
+    expected = loop_matrix(law, plant, delay * T)
+    with ctx.workprec(200):
+        loop = data.loop(one, data.windings[0], data.correction_poles[0])
+        assert loop.nrows() == len(expected)
+        characteristic = loop.charpoly()
+        for z in np.exp(1j * np.linspace(0.05, 3.1, 7)):
+            found = complex(characteristic(acb(z)).mid())
+            assert abs(found - np.linalg.det(z * np.eye(len(expected)) - expected)) < 1e-8 * abs(found)
 
 
 def random_plant(rng: np.random.Generator, n: int = 3) -> tuple[ElasticPlant, FloatArray]:
@@ -184,7 +185,8 @@ def drawn(rng: np.random.Generator) -> tuple[MotorLaw, ElasticSet, dict[str, Any
         float(np.exp(rng.uniform(np.log(150.0), np.log(1800.0)))),
         float(rng.choice([0.0, 3.0, 5.0, 8.0])),
     )
-    law = law_of(choice, B, K)
+    source = SOURCES[rng.integers(len(SOURCES))]
+    law = replace(law_of(choice, B, K), source=source)
     factor, least = float(rng.choice([1.2, 2.0])), float(rng.choice([0.5e-4, 1e-4, 1.5e-4]))
     b = B / K
     numbers: dict[str, Any] = {
@@ -250,8 +252,15 @@ def test_when_two_hundred_laws_are_random_expect_two_fifths_of_the_stable_ones_a
 
 def test_when_the_least_damping_is_none_expect_aliases_of_light_links_not_excluded() -> None:
     """A light link on an undamped spring rings above pi / T: there is no bound of its aliases."""
-    _, plants, _ = drawn(np.random.default_rng(1))
-    undamped = replace(plants, links=samples((1e-3, 20.0)), dampings=samples((0.0, 0.0)), rotor_tolerance=fmpq(0))
+    _, plants, _ = drawn(np.random.default_rng(3))
+    undamped = replace(
+        plants,
+        delay=samples((0.0, 0.5)),
+        lag=samples((0.0, 0.0)),
+        links=samples((1e-3, 20.0)),
+        dampings=samples((0.0, 0.0)),
+        rotor_tolerance=fmpq(0),
+    )
     found = TwoMassExclusion(data_of(STIFFEST), undamped).decide()
     assert not found.proved
     assert found.anchored

@@ -29,6 +29,7 @@ LAW = {
     "rotor_inertia_kg_m2": [0.4, 0.3],
     "stiffness_nm_rad": [2e4, 1e4],
     "correction_bandwidth_rad_s": 3.0,
+    "correction_source": "motor-torque",
     "friction_viscous_nm_s": [0.0, 0.0],
     "friction_coulomb_nm": [0.0, 0.0],
     "dead_zone_rad": 0.0,

@@ -8,6 +8,7 @@ import pytest
 
 from quasilpv import _runtime
 from quasilpv.certificate import LAWS
+from quasilpv.certificate.gate.motor_loop import CorrectionSource
 from quasilpv.documents.design_inertia import DesignInertia
 from quasilpv.documents.strict_model import NonNegative, Number, Positive, StrictModel
 from quasilpv.documents.tables import Intervals, Matrix, PolytopeTable, PositiveVector, Vector
@@ -20,6 +21,7 @@ NAMES_OF_TYPES: list[tuple[Any, str]] = [
     (Positive, "positive"),
     (NonNegative, "non-negative"),
     (bool, "boolean"),
+    (CorrectionSource, "correction-source"),
     (int, "integer"),
     (tuple[Number, Number, Number, Number], "numbers"),
     (Vector, "joint-values"),

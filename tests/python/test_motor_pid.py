@@ -23,6 +23,7 @@ from quasilpv.scenarios import build_scenario
 from quasilpv.scenarios.registry import tracking_experiment
 from quasilpv.synthesis import DesignRequest, default_controller, synthesise
 from quasilpv.synthesis.elastic import motor_pid
+from quasilpv.systems.robots.joint_drive import EncoderSide
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
 from quasilpv.systems.robots.ur5 import ur5
 from quasilpv.telemetry.codes import TORQUE_SATURATED
@@ -38,6 +39,7 @@ LAW: dict[str, Any] = {
     "rotor_inertia_kg_m2": [0.4, 0.3, 0.2, 0.1],
     "stiffness_nm_rad": [2e4, 1e4, 8e3, 5e3],
     "correction_bandwidth_rad_s": 3.0,
+    "correction_source": "motor-torque",
     "friction_viscous_nm_s": [1.0, 0.5, 0.0, 0.2],
     "friction_coulomb_nm": [2.0, 0.0, 1.0, 0.5],
     "dead_zone_rad": 5e-4,
@@ -48,10 +50,12 @@ def runtime_of(artifact: Artifact) -> _runtime.Artifact:
     return _runtime.Artifact.parse(canonical_json(artifact.to_document()), "test")
 
 
-def test_when_the_law_steps_expect_the_recursion() -> None:
+@pytest.mark.parametrize("source", ["motor-torque", "joint-torque", "deflection"])
+def test_when_the_law_steps_expect_the_recursion(source: str) -> None:
     rng = np.random.default_rng(12)
     tree = random_tree(rng, 4)
-    controller = _runtime.Controller(runtime_of(tree_artifact(tree, LAW, torque_nm=1e7)))
+    law = {**LAW, "correction_source": source}
+    controller = _runtime.Controller(runtime_of(tree_artifact(tree, law, torque_nm=1e7)))
     B, K = np.array(LAW["rotor_inertia_kg_m2"]), np.array(LAW["stiffness_nm_rad"])
     viscous, coulomb = np.array(LAW["friction_viscous_nm_s"]), np.array(LAW["friction_coulomb_nm"])
     share, left_alone = 1.0 - math.exp(-3.0 * T), 0
@@ -63,7 +67,9 @@ def test_when_the_law_steps_expect_the_recursion() -> None:
         y = r + 1e-3 * rng.normal(size=4)
         if k == 0:
             th = y.copy()
-        report = controller.step(y, r, rd, rdd, np.zeros(4), k)
+        wound, told = rng.normal(0.0, 1e-3, 4), k % 7 != 3
+        sensors = {"joint_torque_nm": K * wound, "link_angle_rad": y - wound} if told else {}
+        report = controller.step(y, r, rd, rdd, np.zeros(4), k, gears={"motor_angle_rad": y, **sensors})
         fed = tree.inverse_dynamics(r, rd, rdd)
         motor = r + fed / K + c2
         th, w, d, j = (x + gain * (y - th) for x, gain in zip((th, w, d, j), gains, strict=True))
@@ -71,11 +77,13 @@ def test_when_the_law_steps_expect_the_recursion() -> None:
         friction = viscous * rd + coulomb * np.tanh(rd / 0.01)
         torque = B * a + fed + friction
         scale = max(1.0, float(np.abs(torque).max()))
-        np.testing.assert_allclose(report.torque_applied[:4], torque, rtol=0, atol=1e-11 * scale)
+        np.testing.assert_allclose(report.torque_applied[:4], torque, rtol=0, atol=1e-12 * scale)
         left_alone += int((np.abs(y - motor) <= LAW["dead_zone_rad"]).sum())
         e_I = e_I + T * np.where(np.abs(y - motor) > LAW["dead_zone_rad"], y - motor, 0.0)
-        c1 = c1 + share * ((torque - fed - friction - B * rdd) / K - c1)
-        c2 = c2 + share * (c1 - c2)
+        unforeseen = wound - fed / K if source != "motor-torque" else (torque - fed - friction - B * rdd) / K
+        if told or source == "motor-torque":
+            c1 = c1 + share * (unforeseen - c1)
+            c2 = c2 + share * (c1 - c2)
         applied = a + d
         th = th + T * w + T**2 / 2.0 * applied + T**3 / 6.0 * j
         w, d = w + T * applied + T**2 / 2.0 * j, d + T * j
@@ -90,8 +98,10 @@ def test_when_the_inertia_is_a_table_or_a_gear_is_none_expect_it_refused() -> No
             tree_artifact(tree, {**LAW, **change})
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.3, 1.2])
-def test_when_a_loop_is_run_on_unit_states_expect_its_growth_rate(delay: float) -> None:
+@pytest.mark.parametrize(
+    ("delay", "source"), [(0.0, "motor-torque"), (0.3, "deflection"), (1.2, "motor-torque"), (1.2, "joint-torque")]
+)
+def test_when_a_loop_is_run_on_unit_states_expect_its_growth_rate(delay: float, source: str) -> None:
     """The plant by small steps of its own differential equation, the law step by step."""
     rng = np.random.default_rng(4)
     root = rng.normal(size=(2, 2))
@@ -103,6 +113,7 @@ def test_when_a_loop_is_run_on_unit_states_expect_its_growth_rate(delay: float) 
         np.array([0.42, 0.19]),
         np.array([1e4, 4e3]),
         3.0,
+        source,
     )
     whole = math.floor(delay)
     late, n = (delay - whole) * T, 2
@@ -129,7 +140,10 @@ def test_when_a_loop_is_run_on_unit_states_expect_its_growth_rate(delay: float) 
         kp, kd, ki = law.feedback
         a = kp * (p1 - c2) + kd * p2 + ki * e_I
         e_I = e_I + T * (y[n : 2 * n] - c2)
-        c1 = c1 + share * (law.rotors * a / law.stiffness - c1)
+        gears = y[n : 2 * n] - y[:n]
+        torques = plant.stiffness * gears + plant.damping * (y[3 * n : 4 * n] - y[2 * n : 3 * n])
+        told = {"motor-torque": law.rotors * a / law.stiffness, "deflection": gears}
+        c1 = c1 + share * (told.get(source, torques / law.stiffness) - c1)
         c2 = c2 + share * (c1 - c2)
         held = a + p3
         p1, p2, p3 = p1 + T * p2 + T**2 / 2 * held + T**3 / 6 * p4, p2 + T * held + T**2 / 2 * p4, p3 + T * p4
@@ -147,8 +161,8 @@ def test_when_a_loop_is_run_on_unit_states_expect_its_growth_rate(delay: float) 
 
 
 @cache
-def designed(uncertainty: float = 2.0) -> Artifact:
-    return checked_artifact(synthesise(DesignRequest.of(elastic_ur5(uncertainty=uncertainty), "motor-pid")))
+def designed(side: EncoderSide = "motor") -> Artifact:
+    return checked_artifact(synthesise(DesignRequest.of(elastic_ur5(side=side, uncertainty=2.0), "motor-pid")))
 
 
 def test_when_an_arm_has_motor_encoders_expect_a_design_that_is_proved_and_stable_on_its_grid() -> None:
@@ -162,14 +176,22 @@ def test_when_an_arm_has_motor_encoders_expect_a_design_that_is_proved_and_stabl
     assert artifact.law.stiffness_nm_rad == pytest.approx((3e4, 3e4, 2e4, 6e3, 6e3, 6e3))
 
 
-def followed(robot: SpatialRobot, folder: Path, plant: Any = "perturbed") -> TrackResult:
+def followed(robot: SpatialRobot, folder: Path, plant: Any = "perturbed", side: EncoderSide = "motor") -> TrackResult:
     """The circle by the design for gears within a factor of 2, at half a sample of delay."""
     experiment = tracking_experiment("ur5-circle").by(robot)
-    return track(RunSetup(experiment, designed(), plant=plant, transport_delay_s=T / 2, log=False), folder)
+    return track(RunSetup(experiment, designed(side), plant=plant, transport_delay_s=T / 2, log=False), folder)
 
 
 def test_when_the_load_is_unknown_expect_a_tool_error_below_350_um(tmp_path: Path) -> None:
     assert followed(elastic_ur5(uncertainty=2.0), tmp_path).metrics.rms_tool_m < 350e-6
+
+
+def test_when_encoders_sit_on_both_sides_expect_a_proved_correction_and_200_um(tmp_path: Path) -> None:
+    artifact = designed("both")
+    assert artifact.law.correction_source == "deflection"
+    assert artifact.verification is not None
+    assert artifact.verification["gate"]["proved"]
+    assert followed(elastic_ur5(side="both", uncertainty=2.0), tmp_path, side="both").metrics.rms_tool_m < 200e-6
 
 
 @pytest.mark.full

@@ -7,6 +7,13 @@ namespace {
 
 constexpr double kCoulombSpeed = 0.01;  // w_0, rad/s: friction is not fed forward at once where the reference turns
 
+/// What the correction of the motors' reference is told by.
+enum class CorrectionSource : std::uint8_t {
+  kMotorTorque,  ///< what the motor's torque is beside that which was foreseen
+  kJointTorque,  ///< the same of the joint's torque, by its sensor
+  kDeflection    ///< how far the gear is wound, by encoders on both sides
+};
+
 /// Scalars of the sampled law, the same for every joint. Errors are x - x_r: stabilising kp, kd and ki are negative.
 struct MotorPidParameters final : ObserverParameters {
   struct Feedback {
@@ -21,10 +28,11 @@ struct MotorPidParameters final : ObserverParameters {
   std::array<double, 4> observer{};   ///< l1 (1), l2 (1/s), l3 (1/s^2), l4 (1/s^3)
   JointArray rotor_inertia{};         ///< B, kg m^2, reflected to the joints
   JointArray stiffness{};             ///< K of the gears, N m/rad
-  double correction_bandwidth = 0.0;  ///< of the reference's correction by the torque, rad/s; 0: none
-  JointArray viscous{};               ///< of the motors, N m s/rad, as far as it is known
-  JointArray coulomb{};               ///< likewise, N m
-  double dead_zone = 0.0;             ///< of the integral: errors up to this are not integrated, rad
+  double correction_bandwidth = 0.0;  ///< of the reference's correction, rad/s; 0: none
+  CorrectionSource correction_source = CorrectionSource::kMotorTorque;
+  JointArray viscous{};    ///< of the motors, N m s/rad, as far as it is known
+  JointArray coulomb{};    ///< likewise, N m
+  double dead_zone = 0.0;  ///< of the integral: errors up to this are not integrated, rad
 
   AngleSide controlled_side() const noexcept override { return AngleSide::kMotor; }
   std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
@@ -38,11 +46,13 @@ struct MotorPidParameters final : ObserverParameters {
 ///     a_cmd  = r'' + kp (th - r_m) + kd (w - r') + ki e_I
 ///     Gamma  = B a_cmd + tau_r + f r' + c tanh(r' / w_0), limited                       f, c: friction of the motors
 ///     e_I   += T (y - r_m) outside the dead zone                  anti-windup: see integrate_error()
-///     c_1   += (1 - p) (K^-1 (Gamma_applied - fed forward - B r'') - c_1);  c_2 += (1 - p) (c_1 - c_2),  p = exp(-w_c
-///     T) a_app  = B^-1 (Gamma_applied - fed forward) + a_d,  then as in DobAccelerationLaw
+///     c_1   += (1 - p) (u - c_1);  c_2 += (1 - p) (c_1 - c_2),                      p = exp(-w_c T)
+///     a_app  = B^-1 (Gamma_applied - fed forward) + a_d,  then as in DobAccelerationLaw
 ///
-/// What the torque is beside the one fed forward winds the spring further: slowly, through two lags, the reference of
-/// the motors follows, so that the link comes back.
+/// What the spring is wound beside what was foreseen is u: from the motor's torque K^-1 (Gamma_applied - fed forward -
+/// B r''), from a sensor of the joint's torque K^-1 (tau_J - tau_r), from encoders on both sides y - q - K^-1 tau_r.
+/// Slowly, through two lags, the reference of the motors follows, so that the link comes back. Without the sensor's
+/// reading of a sample c_1 and c_2 stay.
 /// The observer tells the speed; its disturbance is not fed back: the spring's torque is most of it.
 /// Source: Spong 1987, Modeling and control of elastic joint robots; De Luca and Book 2016, Springer Handbook of
 /// Robotics, section 11.1 (feedforward by the rigid inverse dynamics, elastic reference of the motors).
@@ -61,6 +71,17 @@ class MotorPidLaw final : public ObserverLaw<N> {
  private:
   using typename ObserverLaw<N>::Motion;
 
+  void sense(const StepInput& input) noexcept override {
+    sensed_ = input.valid;
+    if (parameters_.correction_source == CorrectionSource::kJointTorque) {
+      sensed_ = sensed_ && input.gears.has(kJointTorque);
+      wound_ = from_array<N>(input.gears.joint_torque_nm).cwiseQuotient(stiffness_);
+    } else if (parameters_.correction_source == CorrectionSource::kDeflection) {
+      sensed_ = sensed_ && input.gears.has(kLinkAngle);
+      wound_ = from_array<N>(input.angle) - from_array<N>(input.gears.link_angle_rad);
+    }
+  }
+
   void begin() noexcept override {
     lagging_.setZero();
     correction_.setZero();
@@ -70,7 +91,8 @@ class MotorPidLaw final : public ObserverLaw<N> {
     parameters_.model.tree->inverse_dynamics(reference.angle.data(), reference.speed.data(),
                                              reference.acceleration.data(), fed_forward_.data());
     ReferenceVectors<N> motors = reference;
-    motors.angle += fed_forward_.cwiseQuotient(stiffness_) + correction_;
+    foreseen_ = fed_forward_.cwiseQuotient(stiffness_);
+    motors.angle += foreseen_ + correction_;
     fed_forward_ += viscous_.cwiseProduct(reference.speed) +
                     coulomb_.cwiseProduct((reference.speed / kCoulombSpeed).array().tanh().matrix());
     return motors;
@@ -98,11 +120,18 @@ class MotorPidLaw final : public ObserverLaw<N> {
   Motion predict(const ObserverState<N>& state, const ModelSample<N>& /*model*/, const ReferenceVectors<N>& reference,
                  StepReport& report) noexcept override {
     const JointVector<N> torque = from_array<N>(report.torque_applied);
-    const JointVector<N> wound =
-        (torque - fed_forward_ - rotor_.cwiseProduct(reference.acceleration)).cwiseQuotient(stiffness_);
-    lagging_ += (1.0 - correction_pole_) * (wound - lagging_);
-    correction_ += (1.0 - correction_pole_) * (lagging_ - correction_);
+    if (parameters_.correction_source == CorrectionSource::kMotorTorque) {
+      const JointVector<N> inertial = rotor_.cwiseProduct(reference.acceleration);
+      follow((torque - fed_forward_ - inertial).cwiseQuotient(stiffness_));
+    } else if (sensed_) {
+      follow(wound_ - foreseen_);
+    }
     return {(torque - fed_forward_).cwiseQuotient(rotor_) + state.disturbance, state.disturbance_rate};
+  }
+
+  void follow(const JointVector<N>& unforeseen) noexcept {
+    lagging_ += (1.0 - correction_pole_) * (unforeseen - lagging_);
+    correction_ += (1.0 - correction_pole_) * (lagging_ - correction_);
   }
 
   MotorPidParameters parameters_;
@@ -112,8 +141,11 @@ class MotorPidLaw final : public ObserverLaw<N> {
   JointVector<N> coulomb_;
   double correction_pole_;
   JointVector<N> fed_forward_ = JointVector<N>::Zero();  // tau_r and friction
-  JointVector<N> lagging_ = JointVector<N>::Zero();      // c_1
-  JointVector<N> correction_ = JointVector<N>::Zero();   // c_2
+  JointVector<N> foreseen_ = JointVector<N>::Zero();     // K^-1 tau_r
+  JointVector<N> wound_ = JointVector<N>::Zero();        // by a sensor, in this sample
+  bool sensed_ = false;
+  JointVector<N> lagging_ = JointVector<N>::Zero();     // c_1
+  JointVector<N> correction_ = JointVector<N>::Zero();  // c_2
 };
 
 std::unique_ptr<ControlLaw> MotorPidParameters::make_law(const LawSettings& settings) const {
@@ -127,6 +159,20 @@ MemberTable<MotorPidParameters::Feedback> feedback_table() {
   feedback.number("kd", &F::kd);
   feedback.number("ki", &F::ki);
   return feedback;
+}
+
+CorrectionSource read_source(const Field& field) {
+  const std::string name = field.text();
+  if (name == "motor-torque") {
+    return CorrectionSource::kMotorTorque;
+  }
+  if (name == "joint-torque") {
+    return CorrectionSource::kJointTorque;
+  }
+  if (name != "deflection") {
+    field.fail_choice({"motor-torque", "joint-torque", "deflection"});
+  }
+  return CorrectionSource::kDeflection;
 }
 
 void require_chain(const Field& law, MotorPidParameters& parameters) {
@@ -147,6 +193,8 @@ LawKind motor_pid() {
   law.positive_joint_values("rotor_inertia_kg_m2", &P::rotor_inertia);
   law.positive_joint_values("stiffness_nm_rad", &P::stiffness);
   law.non_negative("correction_bandwidth_rad_s", &P::correction_bandwidth);
+  law.add({"correction_source", "correction-source"},
+          [](const Field& field, int /*joints*/, P& target) { target.correction_source = read_source(field); });
   law.joint_values("friction_viscous_nm_s", &P::viscous);
   law.joint_values("friction_coulomb_nm", &P::coulomb);
   law.non_negative("dead_zone_rad", &P::dead_zone);

@@ -12,6 +12,7 @@ namespace quasilpv {
   LAW(state_feedback)      \
   LAW(descriptor_feedback) \
   LAW(delayed_feedback)    \
+  LAW(link_damped)         \
   LAW(motor_pid)           \
   LAW(pid)                 \
   LAW(computed_torque)     \

@@ -31,7 +31,8 @@ class MotorLaw:
         feedback: (kp, kd, ki), acting on x - x_r.
         observer: (l1, l2, l3, l4).
         rotors, stiffness: B and K as the law has them, (n,).
-        correction_rad_s: bandwidth of the correction of the motors' reference by the torque.
+        correction_rad_s: bandwidth of the correction of the motors' reference.
+        source: what tells it: "motor-torque", "joint-torque" or "deflection".
     """
 
     sample_period_s: float
@@ -40,9 +41,10 @@ class MotorLaw:
     rotors: FloatArray
     stiffness: FloatArray
     correction_rad_s: float
+    source: str = "motor-torque"
 
     def state_space(self, joint: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-        """``x+ = A x + b th``, ``a = c x + d th`` of a joint.
+        """``x+ = A x + b th``, ``a = c x + d th`` of a joint; what sensors tell of its gear comes on top (`sensed`).
 
         States: predicted angle, speed, disturbance and its rate, integral, and both lags of the correction.
         """
@@ -53,7 +55,8 @@ class MotorLaw:
         command = kp * (corrected[0] - correction) + kd * corrected[1] + ki * integral
         applied = command + corrected[2]
         share = 1.0 - math.exp(-self.correction_rad_s * T)
-        lagging = lagging + share * (self.rotors[joint] / self.stiffness[joint] * command - lagging)
+        told = self.rotors[joint] / self.stiffness[joint] * command if self.source == "motor-torque" else 0.0 * command
+        lagging = lagging + share * (told - lagging)
         following = np.array(
             [
                 corrected[0] + T * corrected[1] + T**2 / 2.0 * applied + T**3 / 6.0 * corrected[3],
@@ -66,6 +69,15 @@ class MotorLaw:
             ]
         )
         return following[:, :STATES], following[:, STATES], command[:STATES], float(command[STATES])
+
+    @property
+    def sensed(self) -> FloatArray:
+        """What a joint's states take of how far its gear is wound, as sensors tell it, (7,)."""
+        share = 1.0 - math.exp(-self.correction_rad_s * self.sample_period_s)
+        entries = np.zeros(STATES)
+        if self.source != "motor-torque":
+            entries[5:] = share, share**2
+        return entries
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +95,17 @@ class ElasticPlant:
     stiffness: FloatArray
     damping: FloatArray
     lag_s: float = 0.0
+
+    def wound(self, law: MotorLaw) -> FloatArray:
+        """How far the gears are wound, as the law's sensors tell it, from the states, (n, order)."""
+        n = len(self.rotors)
+        rows = np.zeros((n, self.order))
+        if law.source == "deflection":
+            rows[:, : 2 * n] = np.hstack([-np.eye(n), np.eye(n)])
+        elif law.source == "joint-torque":
+            pull, drag = np.diag(self.stiffness / law.stiffness), np.diag(self.damping / law.stiffness)
+            rows[:, : 4 * n] = np.hstack([-pull, pull, -drag, drag])
+        return rows
 
     @property
     def order(self) -> int:
@@ -112,7 +135,12 @@ class ElasticPlant:
 
 
 def growth_rate(law: MotorLaw, plant: ElasticPlant, delay_s: float) -> float:
-    """``log(spectral radius) / T`` of the frozen loop, 1/s; negative when stable.
+    """``log(spectral radius) / T`` of the frozen loop, 1/s; negative when stable. See `loop_matrix`."""
+    return float(np.log(np.abs(np.linalg.eigvals(loop_matrix(law, plant, delay_s))).max()) / law.sample_period_s)
+
+
+def loop_matrix(law: MotorLaw, plant: ElasticPlant, delay_s: float) -> FloatArray:
+    """The map of all states from a sample to the next: plant, law joint by joint, commands on their way.
 
     Args:
         law: the scalars.
@@ -138,7 +166,8 @@ def growth_rate(law: MotorLaw, plant: ElasticPlant, delay_s: float) -> float:
     following[:own, :own] = after @ before
     following[:own] += by_new @ on_its_way[whole] + after @ by_old @ on_its_way[whole + 1]
     following[own:states, :own] = block_diag(*(column[:, None] for column in b)) @ angle
+    following[own:states, :own] += np.kron(plant.wound(law), law.sensed[:, None])
     following[own:states, own:states] = block_diag(*A)
     for i in range(whole + 1):
         following[states + i * n : states + (i + 1) * n] = on_its_way[i]
-    return float(np.log(np.abs(np.linalg.eigvals(following)).max()) / T)
+    return following

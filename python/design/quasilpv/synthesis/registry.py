@@ -29,6 +29,7 @@ class ControllerKind:
         rate_hz: sample rate if nobody asks for another.
         in_space: the same function for robots in space; None if there is none.
         arm_classes: of robots in space that it is for (`quasilpv.systems.robots.joint_drive.ArmClass`).
+        only_by_name: it is never the default of a class.
     """
 
     summary: str
@@ -36,6 +37,7 @@ class ControllerKind:
     rate_hz: float = 1000.0
     in_space: str | None = None
     arm_classes: tuple[str, ...] = ("rigid",)
+    only_by_name: bool = False
 
     def design(self, robot: AnyRobot, specification: Specification, progress: Progress) -> TrackingDesign:
         """Design it; see `synthesise`."""
@@ -125,6 +127,13 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
         "torque.law.premultiplied_torque_law",
         rate_hz=4000.0,
     ),
+    "link-damped": ControllerKind(
+        "elastic joints with encoders on both sides: dob-acceleration on the links, motors damp the gears",
+        None,
+        in_space="elastic.link_damped.link_damped",
+        arm_classes=("elastic, dual encoders",),
+        only_by_name=True,
+    ),
     "motor-pid": ControllerKind(
         "elastic joints with motor encoders: PID of the motors, inverse dynamics and elastic reference; positions only",
         None,
@@ -166,7 +175,7 @@ def default_controller(robot: AnyRobot) -> str:
     if not isinstance(robot, SpatialRobot) or robot.arm_class in CONTROLLERS[DEFAULT_CONTROLLER].arm_classes:
         return DEFAULT_CONTROLLER
     for name, kind in CONTROLLERS.items():
-        if robot.arm_class in kind.arm_classes:
+        if robot.arm_class in kind.arm_classes and not kind.only_by_name:
             return name
     known = dict.fromkeys(str(own) for kind in CONTROLLERS.values() for own in kind.arm_classes)
     raise InputError(robot.source, "joints", f"an arm that is {robot.arm_class}", f"one that is {' or '.join(known)}")

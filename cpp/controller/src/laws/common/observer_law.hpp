@@ -34,6 +34,7 @@ class ObserverLaw : public ControlLaw {
       }
       start(measured);
     }
+    sense(input);
     const ReferenceVectors<N> reference = shape(reference_.accept(input.reference, report));
     const JointVector<N> y = valid ? measured : state_.angle;
     const ModelSample<N> model = sample_model<N>(model_, y, report);
@@ -88,6 +89,8 @@ class ObserverLaw : public ControlLaw {
     started_ = true;
   }
 
+  /// What else is measured in this sample, before everything else.
+  virtual void sense(const StepInput& /*input*/) noexcept {}
   /// Forgets what a law has beside the observer's state.
   virtual void begin() noexcept {}
   /// The reference of what is measured, from that of the joints: the same, unless a law knows what is between them.

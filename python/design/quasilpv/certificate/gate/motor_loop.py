@@ -3,9 +3,11 @@
 Time is counted in samples, ``zeta = z - 1``. From the motor's angle y and the correction c_2 of its reference the law
 commands the acceleration
 
-    D a = N y - R c_2,    c_2 = beta Lambda a,    Lambda = (1 - p)^2 z / (z - p)^2,    p = exp(-w_c T)
+    D a = N y - R c_2,    c_2 = Lambda u,    Lambda = (1 - p)^2 z / (z - p)^2,    p = exp(-w_c T)
 
-with beta = B/K as the law has them, so ``(D + beta R Lambda) a = N y``. D, N and R are those of its whole realisation:
+with u how far the gear is wound: ``u = beta a`` by the motor's torque, beta = B/K as the law has them, ``u = beta f``
+by a sensor of the torque B f of the joint, ``u = y - q`` by encoders on both sides. By the motor's torque that makes it
+``(D + beta R Lambda) a = N y``. D, N and R are those of its whole realisation:
 nothing is cancelled, and what a root of the loop hides in is in D.
 
 Written from the formulas of the law, not from the design's own loop: the two are compared by tests.
@@ -17,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 from flint import arb, arb_mat, fmpq, fmpq_mat, fmpq_poly
 
@@ -27,6 +29,8 @@ from quasilpv.certificate.gate.loop import exponential_poles
 
 ANCHOR_BITS = 512
 Z_OF_ZETA = fmpq_poly([1, 1])
+
+CorrectionSource: TypeAlias = Literal["motor-torque", "joint-torque", "deflection"]
 
 Realisation: TypeAlias = tuple[fmpq_mat, fmpq_mat, fmpq_mat, fmpq_mat, tuple[fmpq, fmpq]]
 """A, its columns for y and c_2, the row of a, and what a takes of y and c_2 at once."""
@@ -42,6 +46,7 @@ class MotorLoopData:
         observer: (l1, l2, l3, l4).
         correction_rad_s: w_c; 0 for no correction.
         rotors, stiffness: B and K of every joint.
+        source: what tells the correction.
     """
 
     sample_period_s: float
@@ -50,6 +55,7 @@ class MotorLoopData:
     correction_rad_s: float
     rotors: tuple[float, ...]
     stiffness: tuple[float, ...]
+    source: CorrectionSource = "motor-torque"
 
     @property
     def period(self) -> fmpq:
@@ -152,12 +158,24 @@ class MotorLoopData:
         correction = arb_mat(1, size)
         correction[0, lags + 1] = arb(1)
         law = _placed(arb_mat(A), size, own) + arb_mat(by_angle) * angle + arb_mat(by_correction) * correction
-        lagging = command * arb((1 - pole) * winding)
+        lagging = self._told(plant, winding, command) * arb(1 - pole)
         lagging[0, lags] = lagging[0, lags] + arb(pole)
         follows = lagging * arb(1 - pole)
         follows[0, lags + 1] = follows[0, lags + 1] + arb(pole)
         shifted = [command, *(_unit(queue + i, size) for i in range(waiting - 1))]
         return _stacked([first, law, lagging, follows, *shifted])
+
+    def _told(self, plant: OneJoint, winding: fmpq, command: arb_mat) -> arb_mat:
+        """The row of u."""
+        told = arb_mat(1, command.ncols())
+        if self.source == "motor-torque":
+            return command * arb(winding)
+        told[0, 0], told[0, 1] = arb(-1), arb(1)
+        if self.source == "joint-torque":
+            told[0, 2], told[0, 3] = arb(-plant.damping), arb(plant.damping)
+            told *= arb(winding / plant.winding)
+        # Without correction nothing is told: its pole is 1.
+        return told
 
 
 @dataclass(frozen=True)

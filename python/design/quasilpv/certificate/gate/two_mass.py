@@ -23,7 +23,10 @@ Let f have length one. Then ``zeta = f* Z f`` lies in the numerical range of Z, 
 
 That no zeta of the polygon does this is decided on cells of (phi, d, s) in ball arithmetic: then no root crosses the
 circle anywhere in the set, and one stable member makes all of them stable. What differs between the joints, the
-correction (by B/K) and the true inertia of the motors (by a tolerance), is a diagonal part of D that counts as E does.
+correction by the motors' torques (by B/K) and the true inertia of the motors (by a tolerance), is a diagonal part of D
+that counts as E does. A correction by sensors is ``D a = N th - R Lambda u`` with ``u = Y f`` at k = 0 for encoders on
+both sides and ``u = beta f`` for sensors of the torque, and ``|u| <= b2 (|f| + sum over k /= 0 of |c_k| / dist_k |a|)``
+with the larger of the b of the set and of the law: it adds ``phi^2 |c R Lambda| b2 (1 + n sum / |c|)``.
 
 No modes are formed: the numerical range of a sum lies in the sum of the numerical ranges. As phi -> 0 P and c N become
 one, and the polygon keeps from 1 by ``1 / m2``; z = -1 is the end of the last cell.
@@ -134,10 +137,14 @@ class TwoMassExclusion:
     def __init__(self, data: MotorLoopData, plants: ElasticSet) -> None:
         """Make the law's polynomials."""
         self.data, self.plants = data, plants
-        betas = data.windings
+        betas = data.windings if data.source == "motor-torque" else (fmpq(0),)
         self.winding, self.spread = (max(betas) + min(betas)) / 2, (max(betas) - min(betas)) / 2
         with ctx.workprec(BITS):
             self.denominator, self.numerator, self.corrected = (acb_poly(part) for part in data.polynomials)
+            self.sensed = arb(0)
+            if data.source != "motor-torque" and data.correction_rad_s > 0.0:
+                widest = (plants.true_windings[1], max(data.windings) * (1 + plants.rotor_tolerance))
+                self.sensed = arb(max(widest))
             first, *others = (arb(pole) for pole in data.correction_poles)
             self.pole = first.union(others[0]) if others else first
 
@@ -230,14 +237,17 @@ class _Enclosed:
         self.P = self.G + self.N + self.N_delta
         differs = D.abs_upper() * arb(tolerance) + corrected.abs_upper() * arb(law.spread * (1 + tolerance))
         aliased = self.N.abs_upper() * _aliases(self.phase, plants)
-        self.apart = (self.square * (aliased + differs * self.lagging.abs_upper()) / self.alpha).upper()
+        sensed = corrected.abs_upper() * law.sensed
+        told = sensed * _sensed_aliases(self.phase, plants) if sensed > 0 else arb(0)
+        self.apart = (self.square * (aliased + told + differs * self.lagging.abs_upper()) / self.alpha).upper()
+        self.lost = (self.square * sensed).upper()
 
     def spare(self) -> float:
         """What is left of the distance between the polygon and what has to be kept, relative; 0 if nothing is.
 
         Where P keeps from 0 the equation is divided by it: corners far out, as light links have, take nothing from it.
         """
-        corners, kept = [corner - 1 for corner in self._polygon()], self.apart * self._length()
+        corners, kept = [corner - 1 for corner in self._polygon()], self.lost + self.apart * self._length()
         if self.P.abs_lower() > 0:
             away = (self.G + self.N_delta) / self.P
             corners, kept = [corner + away for corner in corners], (kept / self.P.abs_lower()).upper()
@@ -252,7 +262,7 @@ class _Enclosed:
         bound = (1 + arb(self.plants.compliances[1]) + self.square * arb(self.plants.true_windings[1])).upper()
         rest = self.P.abs_lower() - self.apart
         if rest > 0:
-            found = (self.N.abs_upper() / rest).upper()
+            found = ((self.N.abs_upper() + self.lost) / rest).upper()
             return found if found < bound else bound
         return bound
 
@@ -300,6 +310,29 @@ def _aliases(phase: arb, plants: ElasticSet | None) -> arb:
     return (abs((phase / 2).sin()) * total).upper()
 
 
+def _sensed_aliases(phase: arb, plants: ElasticSet) -> arb:
+    """Upper bound of the sum over k /= 0 of ``|sin(phi/2) / (phi/2 + pi k)| / dist_k``.
+
+    Of ``|k| > ALIASES`` the imaginary part grows with the frequency at least as the frequency does, so that the terms
+    are at most ``|sin| w_K / (2 pi^2 (|k| - 1/2)^2 dist_K)``, and the sum as in `_aliases`.
+    """
+    pi = arb.pi()
+    total = arb(0)
+    for k in (*range(-ALIASES, 0), *range(1, ALIASES + 1)):
+        rate = abs(phase + 2 * pi * k)
+        total += 2 / rate / _kept_from_zero(rate.lower(), plants)
+    first = (pi * (2 * ALIASES + 1)).lower()
+    total += first / (pi**2 * ALIASES) / _imaginary_part(first, plants)
+    return (abs((phase / 2).sin()) * total).upper()
+
+
+def _imaginary_part(rate: arb, plants: ElasticSet) -> arb:
+    """Lower bound of that of Z."""
+    square = arb(plants.true_windings[0]) * rate**2
+    parts = [(x / (1 + x**2) * square).lower() for x in (arb(end) * rate for end in plants.dampings)]
+    return min(parts, key=float)
+
+
 def _kept_from_zero(rate: arb, plants: ElasticSet | None) -> arb:
     """Lower bound of the distance of the numerical range of Z from 0 at this frequency and all higher ones.
 
@@ -311,7 +344,7 @@ def _kept_from_zero(rate: arb, plants: ElasticSet | None) -> arb:
     x1, x2 = (arb(end) * rate for end in plants.dampings)
     square = arb(plants.true_windings[0]) * rate**2
     candidates = [
-        min((x / (1 + x**2) * square).lower() for x in (x1, x2)),
+        _imaginary_part(rate, plants),
         (square / (1 + x2**2) - 1 - arb(plants.compliances[1])).lower(),
         ((x1.atan() / 2).sin()).lower(),
     ]

@@ -17,7 +17,7 @@ from quasilpv.certificate.exact.claims import Claim, Evidence
 from quasilpv.certificate.exact.matrices import rational
 from quasilpv.certificate.exact.rationals import to_float
 from quasilpv.certificate.gate.elastic import WHAT, ElasticGate, elastic_gate
-from quasilpv.certificate.gate.motor_loop import MotorLoopData
+from quasilpv.certificate.gate.motor_loop import CorrectionSource, MotorLoopData
 from quasilpv.certificate.laws.dob_acceleration import Feedback
 from quasilpv.certificate.laws.kind import LawKind
 from quasilpv.certificate.reading import Shipped, WitnessDocument
@@ -34,7 +34,9 @@ class MotorPidLaw(ChainLaw):
     Attributes:
         rotor_inertia_kg_m2: B of the motors, reflected to the joints.
         stiffness_nm_rad: K of the gears.
-        correction_bandwidth_rad_s: of the correction of the motors' reference by the torque; 0 for none.
+        correction_bandwidth_rad_s: of the correction of the motors' reference; 0 for none.
+        correction_source: what tells how far the gears are wound: the motors' torques, sensors of the joints' torques,
+            or encoders on both sides.
         friction_viscous_nm_s, friction_coulomb_nm: of the motors, fed forward.
         dead_zone_rad: errors up to this are not integrated, so that a motor that sticks does not hunt.
     """
@@ -47,6 +49,7 @@ class MotorPidLaw(ChainLaw):
     rotor_inertia_kg_m2: PositiveVector
     stiffness_nm_rad: PositiveVector
     correction_bandwidth_rad_s: NonNegative
+    correction_source: CorrectionSource
     friction_viscous_nm_s: Vector
     friction_coulomb_nm: Vector
     dead_zone_rad: NonNegative
@@ -101,6 +104,7 @@ def loop_data(law: MotorPidLaw, sample_period_s: float) -> MotorLoopData:
         feedback=(law.feedback.kp, law.feedback.kd, law.feedback.ki),
         observer=law.observer,
         correction_rad_s=law.correction_bandwidth_rad_s,
+        source=law.correction_source,
         rotors=tuple(law.rotor_inertia_kg_m2),
         stiffness=tuple(law.stiffness_nm_rad),
     )

@@ -13,7 +13,6 @@ its points, the artifact is called gridded and claims nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import pi, sqrt
 from typing import Any
@@ -24,23 +23,23 @@ from flint import fmpq
 from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.matrices import rational
 from quasilpv.certificate.gate.elastic import elastic_set
-from quasilpv.certificate.gate.motor_loop import MotorLoopData
+from quasilpv.certificate.gate.motor_loop import CorrectionSource, MotorLoopData
 from quasilpv.certificate.gate.two_mass import Exclusion, TwoMassExclusion
 from quasilpv.certificate.laws.motor_pid import MotorPidLaw
 from quasilpv.conditions.tracking.sampled_chains import observer_gains
 from quasilpv.documents.payloads import TreePayloads
 from quasilpv.documents.strict_model import validate
 from quasilpv.errors import InfeasibleError, InputError
-from quasilpv.loops.elastic_loop import ElasticPlant, MotorLaw, growth_rate
+from quasilpv.loops.elastic_loop import MotorLaw, growth_rate
 from quasilpv.progress import Progress, no_progress
-from quasilpv.synthesis.acceleration.tree_law import SEED, design_inertia
+from quasilpv.synthesis.acceleration.tree_law import design_inertia
 from quasilpv.synthesis.chain_range import find_range
+from quasilpv.synthesis.elastic.arms import elastic_drives, grid_arms, links_of
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.joint_drive import ElasticDrive
 from quasilpv.systems.robots.spatial import SpatialInertia
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
-from quasilpv.systems.robots.tree import KinematicTree
 
 POSTURES = 100
 BESIDE_A_PROOF = 20
@@ -48,6 +47,9 @@ BESIDE_A_PROOF = 20
 
 DEAD_ZONE_COUNTS = 3
 """Of the encoder: what the integral leaves alone where Coulomb friction is stated, since a motor that sticks hunts."""
+
+MOTOR_CORRECTION, SENSED_CORRECTION = 3.0, 8.0
+"""Bandwidths of the correction, rad/s: by the motors' torques, which friction is part of, and by sensors."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class Gains:
     proportional: float
     integral: float
     observer: float
-    correction: float = 3.0
+    correction: float = MOTOR_CORRECTION
 
     def feedback(self) -> FloatArray:
         """(kp, kd, ki)."""
@@ -81,12 +83,14 @@ def motor_pid(robot: SpatialRobot, specification: Specification, progress: Progr
         InputError: a joint is rigid, its encoder is on the link only, or the drives lag.
         InfeasibleError: no choice of gains is stable on the whole grid.
     """
-    drives = elastic_drives(robot)
+    drives = elastic_drives(robot, "motor-pid", ("motor", "both"))
     if robot.lag_s[1] > 0.0:
         expected = "0 for motor-pid: its loops on the grid have no lag of the motors' currents"
         raise InputError(robot.source, "lag", list(robot.lag_s), expected)
     period = specification.sample_period_s
-    laws = {choice: _law(robot, drives, choice, period) for choice in CHOICES}
+    source, correction = _correction(drives)
+    choices = [replace(choice, correction=correction) for choice in CHOICES]
+    laws = {choice: _law(robot, drives, choice, period, source) for choice in choices}
     witness = _links_witness(robot, specification)
     for choice, law in laws.items():
         if witness is not None and _excluded(robot, law, witness, specification).proved:
@@ -110,7 +114,8 @@ def _grid(
     robot: SpatialRobot, drives: tuple[ElasticDrive, ...], law: MotorLaw, delay_s: float, postures: int
 ) -> dict[str, float]:
     """How many loops were looked at, and the worst of them."""
-    rates = [growth_rate(law, plant, delay) for plant in _plants(robot, drives, postures) for delay in {0.0, delay_s}]
+    arms = list(grid_arms(robot, drives, postures))
+    rates = [growth_rate(law, arm.plant, delay) for arm in arms for delay in {0.0, delay_s}]
     return {"loops": len(rates), "worst_growth_rate_per_s": max(rates)}
 
 
@@ -132,6 +137,7 @@ def _links_witness(robot: SpatialRobot, specification: Specification) -> dict[st
 
 def _excluded(robot: SpatialRobot, law: MotorLaw, witness: dict[str, Any], specification: Specification) -> Exclusion:
     """What the exclusion will say of these gains, if the bounds of the links are what they seem."""
+    source, _ = _correction(elastic_drives(robot, "motor-pid", ("motor", "both")))
     loop = MotorLoopData(
         sample_period_s=law.sample_period_s,
         feedback=_numbers(law.feedback),
@@ -139,6 +145,7 @@ def _excluded(robot: SpatialRobot, law: MotorLaw, witness: dict[str, Any], speci
         correction_rad_s=law.correction_rad_s,
         rotors=_numbers(law.rotors),
         stiffness=_numbers(law.stiffness),
+        source=source,
     )
     payloads = validate(TreePayloads, robot.payloads.to_document(), robot.source)
     chain = witness["chain"]
@@ -153,7 +160,18 @@ def _numbers(values: FloatArray) -> Any:
     return tuple(float(value) for value in values)
 
 
-def _law(robot: SpatialRobot, drives: tuple[ElasticDrive, ...], choice: Gains, period_s: float) -> MotorLaw:
+def _correction(drives: tuple[ElasticDrive, ...]) -> tuple[CorrectionSource, float]:
+    """By what the motors' reference is corrected, and how fast: what is measured of the gears tells most."""
+    if all(drive.encoder_side == "both" for drive in drives):
+        return "deflection", SENSED_CORRECTION
+    if all(drive.torque_sensor for drive in drives):
+        return "joint-torque", SENSED_CORRECTION
+    return "motor-torque", MOTOR_CORRECTION
+
+
+def _law(
+    robot: SpatialRobot, drives: tuple[ElasticDrive, ...], choice: Gains, period_s: float, source: CorrectionSource
+) -> MotorLaw:
     return MotorLaw(
         sample_period_s=period_s,
         feedback=choice.feedback(),
@@ -161,48 +179,8 @@ def _law(robot: SpatialRobot, drives: tuple[ElasticDrive, ...], choice: Gains, p
         rotors=np.array([joint.rotor_inertia_kg_m2 for joint in robot.joints]),
         stiffness=np.array([sqrt(drive.stiffness_nm_rad[0] * drive.stiffness_nm_rad[1]) for drive in drives]),
         correction_rad_s=choice.correction,
+        source=source,
     )
-
-
-def elastic_drives(robot: SpatialRobot) -> tuple[ElasticDrive, ...]:
-    """The drives of an arm all of whose motors carry encoders.
-
-    Raises:
-        InputError: a joint is rigid, or its motor has none.
-    """
-    found = []
-    for joint in robot.joints:
-        if joint.drive is None:
-            expected = "a gear that gives: motor-pid is for arms all of whose joints are elastic"
-            raise InputError(robot.source, f"joints.{joint.name}.stiffness", "rigid", expected)
-        if joint.drive.encoder_side == "link":
-            expected = "motor or both: motor-pid reads the motors"
-            raise InputError(robot.source, f"joints.{joint.name}.encoder_side", "link", expected)
-        found.append(joint.drive)
-    return tuple(found)
-
-
-def links_of(tree: KinematicTree) -> KinematicTree:
-    """The chain without its rotors."""
-    return replace(tree, joints=tuple(replace(joint, rotor_inertia_kg_m2=0.0) for joint in tree.joints))
-
-
-def _plants(robot: SpatialRobot, drives: tuple[ElasticDrive, ...], count: int) -> Iterator[ElasticPlant]:
-    """Postures x (lightest, heaviest) x (softest, stiffest) gears with their least damping x rotors at both ends."""
-    rng = np.random.default_rng(SEED)
-    low, high = np.array(robot.domain.angle_rad).T
-    postures = rng.uniform(low, high, (count, len(low)))
-    assumed = np.array([joint.rotor_inertia_kg_m2 for joint in robot.joints])
-    tolerance = np.array([joint.rotor_tolerance for joint in robot.joints])
-    for tree in (robot.lightest(), robot.heaviest()[0]):
-        inertias = links_of(tree).inertia(postures)
-        for end in (0, 1):
-            stiffness = np.array([drive.stiffness_nm_rad[end] for drive in drives])
-            damping = np.array([drive.damping_least_s for drive in drives]) * stiffness
-            for sign in (0.0,) if not tolerance.any() else (-1.0, 1.0):
-                rotors = assumed * (1.0 + sign * tolerance)
-                for links in inertias:
-                    yield ElasticPlant(links, rotors, stiffness, damping)
 
 
 def _design(
@@ -222,6 +200,7 @@ def _design(
         "rotor_inertia_kg_m2": law.rotors.tolist(),
         "stiffness_nm_rad": law.stiffness.tolist(),
         "correction_bandwidth_rad_s": law.correction_rad_s,
+        "correction_source": law.source,
         "friction_viscous_nm_s": [joint.friction_viscous_nm_s for joint in robot.joints],
         "friction_coulomb_nm": [joint.friction_coulomb_nm for joint in robot.joints],
         "dead_zone_rad": DEAD_ZONE_COUNTS * 2.0 * pi / 2.0**specification.encoder_bits if robot.rubs else 0.0,
@@ -229,7 +208,7 @@ def _design(
     }
     gears = [
         {"stiffness_nm_rad": list(drive.stiffness_nm_rad), "damping_least_s": drive.damping_least_s}
-        for drive in elastic_drives(robot)
+        for drive in elastic_drives(robot, "motor-pid", ("motor", "both"))
     ]
     return TrackingDesign(
         controller=MotorPidLaw.tag(),
@@ -246,6 +225,7 @@ def _design(
             "integral_rad_s": choice.integral,
             "observer_bandwidth_rad_s": choice.observer,
             "correction_bandwidth_rad_s": choice.correction,
+            "correction_source": law.source,
         },
         witness=witness,
     )

@@ -1,0 +1,154 @@
+"""`link-damped`, the law on the links of elastic arms: sample by sample, its loop, its design, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from quasilpv import _runtime
+from quasilpv.artifact import Artifact
+from quasilpv.documents.canonical import canonical_json
+from quasilpv.errors import InputError
+from quasilpv.experiments.setup import RunSetup
+from quasilpv.experiments.track import track
+from quasilpv.loops.elastic_loop import ElasticPlant
+from quasilpv.loops.link_loop import LinkLaw, link_growth_rate
+from quasilpv.release import checked_artifact
+from quasilpv.scenarios.registry import tracking_experiment
+from quasilpv.synthesis import DesignRequest, default_controller, synthesise
+from reference.elastic_robots import elastic_ur5
+from reference.random_trees import random_tree
+from reference.tree_artifacts import tree_artifact
+
+T = 1e-3
+LAW: dict[str, Any] = {
+    "kind": "link-damped",
+    "feedback": {"kp": -900.0, "kd": -60.0, "ki": -500.0},
+    "observer": [0.8, 250.0, 4e4, 2.5e6],
+    "filter_time_constant_s": 0.01,
+    "inertia_scale": 0.8,
+    "rotor_inertia_kg_m2": [0.4, 0.3, 0.2, 0.1],
+    "stiffness_nm_rad": [2e4, 1e4, 8e3, 5e3],
+    "relative_damping_nm_s": [90.0, 55.0, 40.0, 22.0],
+    "friction_viscous_nm_s": [1.0, 0.5, 0.0, 0.2],
+    "friction_coulomb_nm": [2.0, 0.0, 1.0, 0.5],
+}
+
+
+def runtime_of(artifact: Artifact) -> _runtime.Artifact:
+    return _runtime.Artifact.parse(canonical_json(artifact.to_document()), "test")
+
+
+@pytest.mark.parametrize("torque_nm", [1e7, 60.0], ids=["no limit", "limits act"])
+def test_when_the_law_steps_expect_the_recursion(torque_nm: float) -> None:
+    rng = np.random.default_rng(12)
+    tree = random_tree(rng, 4)
+    controller = _runtime.Controller(runtime_of(tree_artifact(tree, LAW, torque_nm=torque_nm)))
+    B, K, D = (np.array(LAW[name]) for name in ("rotor_inertia_kg_m2", "stiffness_nm_rad", "relative_damping_nm_s"))
+    viscous, coulomb = np.array(LAW["friction_viscous_nm_s"]), np.array(LAW["friction_coulomb_nm"])
+    kp, kd, ki = LAW["feedback"].values()
+    pole, s = math.exp(-T / 0.01), LAW["inertia_scale"]
+    start, ways = rng.uniform(-1.0, 1.0, 4), 0.3 * rng.normal(size=4)
+    th, w, d, j, df, e_I = start.copy(), *np.zeros((5, 4))
+    before: Any = None
+    limited = 0
+    for k in range(60):
+        r, rd, rdd = start + ways * np.sin(6 * k * T), 6 * ways * np.cos(6 * k * T), -36 * ways * np.sin(6 * k * T)
+        y = r + 1e-4 * rng.normal(size=4)
+        if k == 0:
+            th = y.copy()
+        motor = y + rng.normal(0.0, 1e-4, 4)
+        told = k % 9 != 4
+        gears = {"link_angle_rad": y, **({"motor_angle_rad": motor} if told else {})}
+        report = controller.step(np.full(4, 9.0), r, rd, rdd, np.zeros(4), k, gears=gears)
+        fed = tree.inverse_dynamics(r, rd, rdd)
+        unforeseen = motor - y - (fed - B * rdd) / K
+        damping = D / T * (unforeseen - before) if told and before is not None else np.zeros(4)
+        before = unforeseen if told else None
+        th, w, d, j = (x + gain * (y - th) for x, gain in zip((th, w, d, j), LAW["observer"], strict=True))
+        df = pole * df + (1.0 - pole) * d
+        a = kp * (th - r) + kd * (w - rd) + ki * e_I - df
+        M = tree.inertia(y)
+        torque = fed + viscous * rd + coulomb * np.tanh(rd / 0.01) + s * M @ a - damping
+        applied = np.clip(torque, -torque_nm, torque_nm)
+        scale = max(1.0, float(np.abs(torque).max()))
+        np.testing.assert_allclose(report.torque_applied[:4], applied, rtol=0, atol=1e-12 * scale)
+        limited += int((applied != torque).sum())
+        np.testing.assert_allclose(report.integral_error[:4], e_I, rtol=0, atol=1e-12)
+        e_I = e_I + T * np.where(blocked(torque, applied, ki * (y - r)), 0.0, y - r)
+        held = rdd + a + np.linalg.solve(M, applied - torque) / s + d
+        th = th + T * w + T**2 / 2.0 * held + T**3 / 6.0 * j
+        w, d = w + T * held + T**2 / 2.0 * j, d + T * j
+    assert (limited > 0) == (torque_nm < 1e7)
+
+
+def blocked(commanded: np.ndarray, applied: np.ndarray, grows: np.ndarray) -> np.ndarray:
+    """Where a limit acts and the integral would push further into it."""
+    return np.asarray((commanded - applied) * grows > 0.0)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.4, 1.3])
+def test_when_a_loop_is_run_on_unit_states_expect_its_growth_rate(delay: float) -> None:
+    """The law step by step; the plant by the exponential that the tests of `motor-pid` compare with small steps."""
+    rng = np.random.default_rng(4)
+    root, n = rng.normal(size=(2, 2)), 2
+    plant = ElasticPlant(root @ root.T + np.eye(2), np.array([0.4, 0.2]), np.array([9e3, 5e3]), np.array([1.5, 1.0]))
+    inertia = 1.1 * plant.links + np.diag(plant.rotors)
+    law = LinkLaw(T, np.array([-900.0, -60.0, -500.0]), np.array(LAW["observer"]), 0.01, 0.8, np.array([60.0, 30.0]))
+    whole = math.floor(delay)
+    late = (delay - whole) * T
+    (before, by_old), (after, by_new) = (plant.held(time, np.ones(n)) for time in (late, T - late))
+    pole = math.exp(-T / 0.01)
+
+    def sample(state: np.ndarray) -> np.ndarray:
+        y, own, old = state[: 4 * n], state[4 * n : 11 * n].reshape(7, n), state[11 * n :].reshape(-1, n)
+        th, w, d, j, df, e_I, u = own
+        q, motor = y[:n], y[n : 2 * n]
+        th, w, d, j = (x + gain * (q - th) for x, gain in zip((th, w, d, j), law.observer, strict=True))
+        df = pole * df + (1.0 - pole) * d
+        kp, kd, ki = law.feedback
+        a = kp * th + kd * w + ki * e_I - df
+        torque = 0.8 * inertia @ a - law.relative_damping * (motor - q - u) / T
+        torques = [torque, *old]
+        y = after @ (before @ y + by_old @ torques[whole + 1]) + by_new @ torques[whole]
+        held = a + d
+        th, w, d = th + T * w + T**2 / 2 * held + T**3 / 6 * j, w + T * held + T**2 / 2 * j, d + T * j
+        own = np.array([th, w, d, j, df, e_I + T * q, motor - q])
+        return np.concatenate([y, own.ravel(), *torques[: whole + 1]])
+
+    size = 11 * n + n * (whole + 1)
+    transition = np.array([sample(unit) for unit in np.eye(size)]).T
+    rate = math.log(np.abs(np.linalg.eigvals(transition)).max()) / T
+    assert link_growth_rate(law, plant, inertia, delay * T) == pytest.approx(rate, rel=1e-6)
+
+
+@cache
+def designed() -> Artifact:
+    return checked_artifact(synthesise(DesignRequest.of(elastic_ur5(side="both", uncertainty=2.0), "link-damped")))
+
+
+def test_when_encoders_sit_on_both_sides_expect_a_gridded_design_that_is_asked_for_by_name_and_80_um(
+    tmp_path: Path,
+) -> None:
+    artifact, robot = designed(), elastic_ur5(side="both", uncertainty=2.0)
+    assert default_controller(robot) == "motor-pid"
+    assert artifact.verification is not None
+    report = artifact.verification["report"]
+    assert report["evidence"] == "gridded"
+    assert report["worst_growth_rate_per_s"] < 0.0
+    assert "gate" not in artifact.verification
+    assert artifact.law.feedback.ki == 0.0
+    setup = RunSetup(
+        tracking_experiment("ur5-circle").by(robot), artifact, plant="perturbed", transport_delay_s=T / 2, log=False
+    )
+    assert track(setup, tmp_path).metrics.rms_tool_m < 80e-6
+
+
+def test_when_an_arm_is_of_another_class_expect_the_law_refused_by_name() -> None:
+    with pytest.raises(InputError, match=r"link-damped for an arm that is elastic, motor encoders"):
+        synthesise(DesignRequest.of(elastic_ur5(), "link-damped"))
