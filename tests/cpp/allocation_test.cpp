@@ -64,6 +64,7 @@ using ::quasilpv::testing::kLawKinds;
 using ::quasilpv::testing::kPaces;
 using ::quasilpv::testing::make_loop;
 using ::quasilpv::testing::QuietRobot;
+using ::quasilpv::testing::QuietSystem;
 using ::quasilpv::testing::run_control_thread;
 using ::quasilpv::testing::system_table;
 using ::quasilpv::testing::with_chain;
@@ -127,6 +128,18 @@ TEST_F(Allocation, does_not_happen_in_the_steps_of_a_general_system_whatever_the
   });
   EXPECT_EQ(count, 0);
   EXPECT_EQ(flags, kSignalInvalid | kSystemPremiseOutside | kInputSaturated | kOutsideRegion);
+}
+
+TEST_F(Allocation, does_not_happen_in_the_control_thread_of_a_general_system_whatever_the_plant_does) {
+  for (const Pace pace : kPaces) {
+    SystemLoop loop(SystemArtifact::parse(json_twin(system_table()), "test"), {});
+    auto ring = std::make_unique<SystemRing>();  // nobody empties it
+    loop.publish_to(ring.get());
+    QuietSystem system;
+    EXPECT_EQ(calls_in([&] { run_control_thread(loop, system, pace); }), 0);
+    EXPECT_GT(ring->drops(), 0);
+    EXPECT_GT(loop.faults(), 0);
+  }
 }
 
 TEST_F(Allocation, does_not_happen_in_laws_with_a_chain_of_bodies_whether_limits_act_or_not) {

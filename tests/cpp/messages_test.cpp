@@ -12,7 +12,23 @@
 namespace quasilpv {
 namespace {
 
-constexpr WireIdentity kIdentity{42, -7, 3};
+constexpr WireIdentity kIdentity{42, -7, 3, Pace::kLockStep, 0, {4, 2, 3, 5}};
+
+template <class Message>
+void fill(Message& message) {
+  message.joints = kIdentity.joints;
+}
+void fill(event_v2& message) {
+  message.source = static_cast<std::int32_t>(Side::kPlant);
+  message.code = static_cast<std::int32_t>(EventCode::kStarted);
+}
+void fill(signals_measurement_v1& message) { message.signals = 6; }
+void fill(signals_command_v1& message) { message.inputs = 3; }
+void fill(signals_telemetry_v1& message) {
+  message.states = 4;
+  message.inputs = 3;
+  message.premises = 5;
+}
 
 template <class Message>
 Message sealed_message() {
@@ -20,12 +36,7 @@ Message sealed_message() {
   message.seq = 5;
   message.session = kIdentity.session;
   message.artifact_hash = kIdentity.artifact_hash;
-  if constexpr (!std::is_same_v<Message, event_v2>) {
-    message.joints = kIdentity.joints;
-  } else {
-    message.source = static_cast<std::int32_t>(Side::kPlant);
-    message.code = static_cast<std::int32_t>(EventCode::kStarted);
-  }
+  fill(message);
   return message;
 }
 
@@ -33,6 +44,13 @@ template <class Message>
 DecodeStatus decode_status(const Packet& packet, const WireIdentity& identity = kIdentity) {
   Message message{};
   return decode(packet.bytes.data(), static_cast<std::size_t>(packet.size), identity, message);
+}
+
+WireIdentity with_identity(std::int64_t session, std::int64_t artifact_hash) {
+  WireIdentity identity = kIdentity;
+  identity.session = session;
+  identity.artifact_hash = artifact_hash;
+  return identity;
 }
 
 /// Replaces the checksum by the right one for the bytes as they are.
@@ -46,7 +64,8 @@ void reseal(Packet& packet) {
 
 template <class Message>
 class EveryMessage : public testing::Test {};
-using Messages = testing::Types<measurement_v3, command_v2, telemetry_v2, event_v2>;
+using Messages = testing::Types<measurement_v3, command_v2, telemetry_v2, event_v2, signals_measurement_v1,
+                                signals_command_v1, signals_telemetry_v1>;
 TYPED_TEST_SUITE(EveryMessage, Messages);
 
 TYPED_TEST(EveryMessage, fits_one_unfragmented_packet) {
@@ -97,14 +116,62 @@ TYPED_TEST(EveryMessage, when_the_fingerprint_is_of_another_type_expect_it_refus
 TYPED_TEST(EveryMessage, when_session_or_artifact_differ_expect_it_refused) {
   Packet packet;
   encode(sealed_message<TypeParam>(), packet);
-  EXPECT_EQ(decode_status<TypeParam>(packet, {43, -7, 3}), DecodeStatus::kWrongSession);
-  EXPECT_EQ(decode_status<TypeParam>(packet, {42, 7, 3}), DecodeStatus::kWrongArtifact);
+  EXPECT_EQ(decode_status<TypeParam>(packet, with_identity(43, -7)), DecodeStatus::kWrongSession);
+  EXPECT_EQ(decode_status<TypeParam>(packet, with_identity(42, 7)), DecodeStatus::kWrongArtifact);
 }
 
 TEST(Messages, when_the_number_of_joints_differs_expect_the_artifact_refused) {
   Packet packet;
   encode(sealed_message<measurement_v3>(), packet);
   EXPECT_EQ(decode_status<measurement_v3>(packet, {42, -7, 2}), DecodeStatus::kWrongArtifact);
+}
+
+TEST(Messages, when_the_number_of_any_signals_differs_expect_the_artifact_refused) {
+  Packet measurement;
+  Packet command;
+  Packet telemetry;
+  encode(sealed_message<signals_measurement_v1>(), measurement);
+  encode(sealed_message<signals_command_v1>(), command);
+  encode(sealed_message<signals_telemetry_v1>(), telemetry);
+  for (int SignalCounts::*const count :
+       {&SignalCounts::states, &SignalCounts::parameters, &SignalCounts::inputs, &SignalCounts::premises}) {
+    WireIdentity other = kIdentity;
+    ++(other.signals.*count);
+    const bool measured = count == &SignalCounts::states || count == &SignalCounts::parameters;
+    const auto expected = [](bool concerned) {
+      return concerned ? DecodeStatus::kWrongArtifact : DecodeStatus::kAccepted;
+    };
+    EXPECT_EQ(decode_status<signals_measurement_v1>(measurement, other), expected(measured));
+    EXPECT_EQ(decode_status<signals_command_v1>(command, other), expected(count == &SignalCounts::inputs));
+    EXPECT_EQ(decode_status<signals_telemetry_v1>(telemetry, other), expected(count != &SignalCounts::parameters));
+  }
+}
+
+TEST(Messages, of_a_system_carry_every_value_of_its_sample) {
+  SystemSample sample;
+  sample.seq = 7;
+  sample.state = ControllerState::kDegraded;
+  sample.flags = kOutsideRegion | kInputSaturated;
+  sample.realtime = true;
+  sample.drops = 3;
+  sample.step_ns = 800;
+  sample.measured.back() = 1.0 / 3.0;
+  sample.commanded.back() = -2.5;
+  sample.applied.back() = -0.0;
+  sample.premise.back() = 0.1;
+  sample.level = 1.25;
+  const signals_telemetry_v1 message = to_message(sample);
+  EXPECT_EQ(message.seq, 7);
+  EXPECT_EQ(message.state, 3);
+  EXPECT_EQ(message.flags, 20);
+  EXPECT_EQ(message.realtime, 1);
+  EXPECT_EQ(message.drops, 3);
+  EXPECT_EQ(message.step_ns, 800);
+  EXPECT_EQ(message.measured[31], 1.0 / 3.0);
+  EXPECT_EQ(message.commanded[6], -2.5);
+  EXPECT_TRUE(std::signbit(message.applied[6]));
+  EXPECT_EQ(message.premise[31], 0.1);
+  EXPECT_EQ(message.level, 1.25);
 }
 
 TEST(Messages, keep_every_bit_of_a_double) {
@@ -150,8 +217,9 @@ DecodeStatus status_with(Value Message::*member, Value value, std::int64_t perio
   message.*member = value;
   Packet packet;
   encode(message, packet);
-  return decode_status<Message>(
-      packet, {kIdentity.session, kIdentity.artifact_hash, kIdentity.joints, Pace::kLockStep, period_ns});
+  WireIdentity identity = kIdentity;
+  identity.period_ns = period_ns;
+  return decode_status<Message>(packet, identity);
 }
 
 constexpr std::int64_t kLowest = std::numeric_limits<std::int64_t>::min();
@@ -161,11 +229,11 @@ TYPED_TEST(EveryMessage, when_a_number_of_it_is_beyond_what_any_side_sends_expec
   for (const std::int64_t value : {kLowest, std::int64_t{-1}, kHighest}) {
     EXPECT_EQ(status_with(&TypeParam::utime, value), DecodeStatus::kOutOfBounds) << value;
     EXPECT_EQ(status_with(&TypeParam::seq, value), DecodeStatus::kOutOfBounds) << value;
-    if constexpr (!std::is_same_v<TypeParam, telemetry_v2>) {
+    if constexpr (!kIsTelemetry<TypeParam>) {
       EXPECT_EQ(status_with(&TypeParam::period_ns, value), DecodeStatus::kOutOfBounds) << value;
     }
   }
-  if constexpr (!std::is_same_v<TypeParam, telemetry_v2>) {
+  if constexpr (!kIsTelemetry<TypeParam>) {
     EXPECT_EQ(status_with(&TypeParam::mode, 2), DecodeStatus::kOutOfBounds);
     EXPECT_EQ(status_with(&TypeParam::mode, -1), DecodeStatus::kOutOfBounds);
     EXPECT_EQ(status_with(&TypeParam::mode, 1), DecodeStatus::kAccepted);
@@ -182,11 +250,12 @@ TYPED_TEST(EveryMessage, when_its_sample_is_the_last_one_possible_expect_its_tim
 }
 
 TEST(Messages, when_a_code_has_no_meaning_expect_it_refused) {
-  for (const std::int32_t code : {-1, 0, 5, 1 << 30}) {
+  for (const std::int32_t code : {-1, 0, 6, 1 << 30}) {
     EXPECT_EQ(status_with(&event_v2::code, code), DecodeStatus::kOutOfBounds) << code;
-    EXPECT_EQ(status_with(&event_v2::source, code == 5 ? 4 : code), DecodeStatus::kOutOfBounds) << code;
-    EXPECT_EQ(status_with(&command_v2::state, code == 0 ? 6 : code), DecodeStatus::kOutOfBounds) << code;
-    EXPECT_EQ(status_with(&measurement_v3::available, code == 0 || code == 5 ? 8 : code), DecodeStatus::kOutOfBounds);
+    EXPECT_EQ(status_with(&event_v2::source, code == 6 ? 4 : code), DecodeStatus::kOutOfBounds) << code;
+    EXPECT_EQ(status_with(&command_v2::state, code == 0 ? 5 : code), DecodeStatus::kOutOfBounds) << code;
+    EXPECT_EQ(status_with(&signals_command_v1::state, code == 0 ? 5 : code), DecodeStatus::kOutOfBounds) << code;
+    EXPECT_EQ(status_with(&measurement_v3::available, code == 0 || code == 6 ? 8 : code), DecodeStatus::kOutOfBounds);
   }
   EXPECT_EQ(status_with(&measurement_v3::available, 5), DecodeStatus::kAccepted);
 }

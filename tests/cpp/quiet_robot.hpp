@@ -13,9 +13,10 @@ namespace quasilpv::testing {
 
 /// Good samples, gaps, bad angles, foreign messages and silences, each with the fault it leads to and its reset. Reads
 /// the clock, and otherwise makes no system call, takes no lock and allocates nothing.
-class QuietRobot : public Robot {
+template <class Reading, class Command>
+class QuietPort : public ControlPort<Reading, Command> {
  public:
-  bool read(RobotReading& reading, std::int64_t /*timeout_ns*/) noexcept override {
+  bool read(Reading& reading, std::int64_t /*timeout_ns*/) noexcept override {
     const std::int64_t now_ns = monotonic_ns();
     if (now_ns < silent_until_ns_) {
       return false;
@@ -26,12 +27,11 @@ class QuietRobot : public Robot {
     }
     reading.seq = seq_;
     reading.taken_ns = now_ns;
-    reading.angle_rad = kStart;
-    reading.angle_rad[1] = seq_ % 1000 < 30 ? std::numeric_limits<double>::quiet_NaN() : 0.1;
+    measure(reading, seq_ % 1000 < 30 ? std::numeric_limits<double>::quiet_NaN() : 0.1);
     return true;
   }
 
-  void write(const RobotCommand& /*command*/) noexcept override {}
+  void write(const Command& /*command*/) noexcept override {}
 
   RobotRequest take_request() noexcept override {
     if (seq_ >= kSamples) {
@@ -45,9 +45,21 @@ class QuietRobot : public Robot {
  private:
   static constexpr std::int64_t kSamples = 5000;
 
+  static void measure(RobotReading& reading, double second) noexcept {
+    reading.angle_rad = kStart;
+    reading.angle_rad[1] = second;
+  }
+  static void measure(SystemReading& reading, double second) noexcept {
+    reading.value[0] = 1.1;
+    reading.value[1] = second;
+  }
+
   std::int64_t seq_ = 0;
   std::int64_t silent_until_ns_ = 0;
 };
+
+using QuietRobot = QuietPort<RobotReading, RobotCommand>;
+using QuietSystem = QuietPort<SystemReading, SystemCommand>;
 
 /// The paces of a run.
 inline constexpr Pace kPaces[] = {Pace::kLockStep, Pace::kRealTime};
@@ -60,7 +72,8 @@ inline ControlLoop make_loop(const char* kind) {
 }
 
 /// The control thread of qlpv-controller over `robot`, from the first reading to the end of the run.
-inline ControllerRunReport run_control_thread(ControlLoop& loop, Robot& robot, Pace pace) noexcept {
+template <class Loop, class Port>
+ControllerRunReport run_control_thread(Loop& loop, Port& robot, Pace pace) noexcept {
   static const std::atomic<bool> kNoStop{false};
   ControllerRunSettings settings;
   settings.pace = pace;

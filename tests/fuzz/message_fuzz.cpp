@@ -16,7 +16,7 @@ namespace {
 
 using namespace quasilpv;  // NOLINT(google-build-using-namespace): this file is the program
 
-constexpr WireIdentity kIdentity{42, -7, 3};
+constexpr WireIdentity kIdentity{42, -7, 3, Pace::kLockStep, 0, {4, 2, 3, 5}};
 constexpr std::size_t kChecksumBytes = 8;
 
 void require(bool holds) {
@@ -71,7 +71,8 @@ class Receiver final : public Link {
 
 /// One packet at an end that is new: nothing is remembered from the input before.
 void receive(Channel channel, const std::vector<std::uint8_t>& bytes, bool authenticated) {
-  Receiver end(channel == Channel::kMeasurement ? Side::kController : Side::kPlant, authenticated);
+  const bool measured = channel == Channel::kMeasurement || channel == Channel::kSignalsMeasurement;
+  Receiver end(measured ? Side::kController : Side::kPlant, authenticated);
   end.accept(channel, bytes.data(), bytes.size());
   require(counted(end.counters()) == 1);
   require(!authenticated || end.counters().accepted == 0);
@@ -82,7 +83,8 @@ void receive(Channel channel, const std::vector<std::uint8_t>& bytes, bool authe
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  constexpr std::array<Channel, 3> kHeard{Channel::kMeasurement, Channel::kCommand, Channel::kEvent};
+  constexpr std::array<Channel, 5> kHeard{Channel::kMeasurement, Channel::kCommand, Channel::kEvent,
+                                          Channel::kSignalsMeasurement, Channel::kSignalsCommand};
   if (size < 2 || size > kMaxMessageBytes) {
     return 0;
   }
@@ -93,6 +95,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     decode_as<command_v2>(bytes);
     decode_as<telemetry_v2>(bytes);
     decode_as<event_v2>(bytes);
+    decode_as<signals_measurement_v1>(bytes);
+    decode_as<signals_command_v1>(bytes);
+    decode_as<signals_telemetry_v1>(bytes);
     receive(channel, bytes, false);
     receive(channel, bytes, true);
   }

@@ -9,6 +9,7 @@
 namespace quasilpv {
 namespace {
 
+constexpr const char* kSchema = "quasilpv.system_artifact";
 constexpr double kShortestPeriodS = 1e-6;
 constexpr double kLongestPeriodS = 10.0;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -32,15 +33,21 @@ SystemSignal parse_signal(const Field& field) {
 
 SystemArtifact SystemArtifact::load(const std::string& path) { return parse(read_file(path), path); }
 
+bool SystemArtifact::is_in(const std::string& path) {
+  const Json document = parse_document(read_file(path), path);
+  return document.contains("schema") && document["schema"] == kSchema;
+}
+
 SystemArtifact SystemArtifact::parse(std::string_view bytes, const std::string& source) {
   const Json document = parse_document(bytes, source);
   const Field root(document, source, "");
-  root["schema"].expect_text("quasilpv.system_artifact");
+  root["schema"].expect_text(kSchema);
   root["schema_version"].integer(1, 1);
   root.only({"schema", "schema_version", "hash", "name", "creator", "design_hash", "sample_period_s", "signals",
              "model", "law", "region", "plant", "witness", "sampling", "verification"});
   SystemArtifact artifact;
   artifact.hash_ = root["hash"].text();
+  artifact.hash_prefix_ = static_cast<std::int64_t>(std::stoull(artifact.hash_.substr(0, 16), nullptr, 16));
   artifact.name_ = root["name"].text();
   artifact.sample_period_s_ = root["sample_period_s"].positive(kShortestPeriodS, kLongestPeriodS);
   artifact.parse_signals(root["signals"]);

@@ -72,7 +72,7 @@ void Field::only(const std::vector<std::string>& allowed) const {
       for (const std::string& name : allowed) {
         names += (names.empty() ? "" : ", ") + name;
       }
-      fail("the unknown member " + shown(Json(key)), "only " + names);
+      fail("the unknown member " + shown(Json(key)), names.empty() ? "no members" : "only " + names);
     }
   }
 }

@@ -74,7 +74,8 @@ void InProcessLink::inject(Channel channel, const void* bytes, std::size_t size)
 }
 
 bool InProcessLink::transmit(Channel channel, const void* bytes, std::size_t size) noexcept {
-  return channel == Channel::kTelemetry || outgoing_->push(channel, bytes, size);
+  const bool unheard = channel == Channel::kTelemetry || channel == Channel::kSignalsTelemetry;
+  return unheard || outgoing_->push(channel, bytes, size);
 }
 
 bool InProcessLink::drain(std::int64_t timeout_ns) noexcept {

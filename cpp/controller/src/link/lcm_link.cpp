@@ -171,7 +171,10 @@ LcmLink::LcmLink(Side side, const WireIdentity& identity, const std::string& url
   require_multicast(address, url);
   connection_ = std::make_unique<Connection>(*this, url);
   if (listen == Listen::kPeer) {
-    connection_->subscribe(side == Side::kController ? Channel::kMeasurement : Channel::kCommand);
+    const bool system = identity.is_of_system();
+    const Channel measurement = system ? Channel::kSignalsMeasurement : Channel::kMeasurement;
+    const Channel command = system ? Channel::kSignalsCommand : Channel::kCommand;
+    connection_->subscribe(side == Side::kController ? measurement : command);
     connection_->subscribe(Channel::kEvent);
   }
 }

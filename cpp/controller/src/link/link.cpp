@@ -29,11 +29,38 @@ bool agree(const measurement_v3& a, const measurement_v3& b) noexcept {
 bool agree(const command_v2& a, const command_v2& b) noexcept {
   return a.state == b.state && a.flags == b.flags && are_identical(a.torque_nm, b.torque_nm);
 }
+bool agree(const signals_measurement_v1& a, const signals_measurement_v1& b) noexcept {
+  return a.flags == b.flags && are_identical(a.value, b.value);
+}
+bool agree(const signals_command_v1& a, const signals_command_v1& b) noexcept {
+  return a.state == b.state && a.flags == b.flags && are_identical(a.input, b.input);
+}
+
+template <class Message>
+void state_sizes(Message& message, const WireIdentity& identity) noexcept {
+  message.joints = identity.joints;
+}
+void state_sizes(signals_measurement_v1& message, const WireIdentity& identity) noexcept {
+  message.signals = identity.signals.states + identity.signals.parameters;
+}
+void state_sizes(signals_command_v1& message, const WireIdentity& identity) noexcept {
+  message.inputs = identity.signals.inputs;
+}
+void state_sizes(signals_telemetry_v1& message, const WireIdentity& identity) noexcept {
+  message.states = identity.signals.states;
+  message.inputs = identity.signals.inputs;
+  message.premises = identity.signals.premises;
+}
 
 }  // namespace
 
 void Link::send(const measurement_v3& message) noexcept { seal_and_transmit(message); }
-void Link::send(const command_v2& message) noexcept {
+void Link::send(const signals_measurement_v1& message) noexcept { seal_and_transmit(message); }
+void Link::send(const command_v2& message) noexcept { send_command(message); }
+void Link::send(const signals_command_v1& message) noexcept { send_command(message); }
+
+template <class Command>
+void Link::send_command(const Command& message) noexcept {
   const bool in_fault = message.state == static_cast<std::int32_t>(ControllerState::kFault);
   if (!in_fault || fault_seq_ < 0) {
     fault_seq_ = in_fault ? message.seq : -1;
@@ -42,6 +69,7 @@ void Link::send(const command_v2& message) noexcept {
   seal_and_transmit(message);
 }
 void Link::send(const telemetry_v2& message) noexcept { seal_and_transmit(message); }
+void Link::send(const signals_telemetry_v1& message) noexcept { seal_and_transmit(message); }
 
 void Link::send(EventCode code, std::int64_t seq, std::int64_t detail, std::int64_t more) noexcept {
   event_v2 event{};
@@ -61,19 +89,19 @@ void Link::seal_and_transmit(Message message) noexcept {
   message.utime = monotonic_ns() / kNanosecondsPerMicrosecond;
   message.session = identity_.session;
   message.artifact_hash = identity_.artifact_hash;
-  if constexpr (!std::is_same_v<Message, telemetry_v2>) {
+  if constexpr (!kIsTelemetry<Message>) {
     message.sender = sender_;
     message.mode = static_cast<std::int32_t>(identity_.pace);
     message.period_ns = identity_.period_ns;
   }
-  if constexpr (std::is_same_v<Message, command_v2> || std::is_same_v<Message, event_v2>) {
+  if constexpr (kIsCommand<Message> || std::is_same_v<Message, event_v2>) {
     message.receiver = peers_.peer();
   }
   if constexpr (std::is_same_v<Message, event_v2>) {
     // No two events of a side have one time: in authenticated mode an equal one is a replayed one.
     message.utime = last_event_utime_ = std::max(message.utime, last_event_utime_ + 1);
   } else {
-    message.joints = identity_.joints;
+    state_sizes(message, identity_);
   }
   encode(message, packet_);
   if (key_) {
@@ -97,7 +125,14 @@ void Link::accept(Channel channel, const void* bytes, std::size_t size) noexcept
     case Channel::kEvent:
       accept_event(bytes, size);
       break;
+    case Channel::kSignalsMeasurement:
+      accept_into(signals_measurement_, bytes, size);
+      break;
+    case Channel::kSignalsCommand:
+      accept_into(signals_command_, bytes, size);
+      break;
     case Channel::kTelemetry:
+    case Channel::kSignalsTelemetry:
       break;  // neither side listens to it
   }
 }
@@ -137,7 +172,7 @@ void Link::look_at_foreign(DecodeStatus status, const Message& message) noexcept
 
 template <class Message>
 bool Link::is_of_peer(Inbox<Message>& inbox, const Message& message) noexcept {
-  if constexpr (std::is_same_v<Message, command_v2>) {
+  if constexpr (kIsCommand<Message>) {
     if (side_ == Side::kPlant && message.receiver != 0 && message.receiver != sender_) {
       ++counters_.second_sender;
       peers_.hears_twin(message.receiver);
@@ -194,7 +229,9 @@ bool Link::fits(const event_v2& event) noexcept {
     }
     return false;
   }
-  return fits(event, side_ == Side::kController ? measurement_.newest_seq : command_.newest_seq);
+  // Of a link, only the messages of a robot or only those of a system are in use; the others are at -1.
+  return fits(event, side_ == Side::kController ? std::max(measurement_.newest_seq, signals_measurement_.newest_seq)
+                                                : std::max(command_.newest_seq, signals_command_.newest_seq));
 }
 
 /// An event of the other side: of the peer, and not older than what it last said about a sample.

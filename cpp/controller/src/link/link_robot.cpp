@@ -31,6 +31,19 @@ FaultCause cause_of(const event_v2& ended) noexcept {
   return FaultCause::kNone;
 }
 
+template <class Message, class Reading>
+bool read_message(Link& link, Reading& reading) noexcept {
+  Message message;
+  const bool taken = link.take(message);
+  if (taken) {
+    reading = to_reading(message);
+  }
+  return taken;
+}
+
+bool take(Link& link, RobotReading& reading) noexcept { return read_message<measurement_v3>(link, reading); }
+bool take(Link& link, SystemReading& reading) noexcept { return read_message<signals_measurement_v1>(link, reading); }
+
 }  // namespace
 
 RobotReading to_reading(const measurement_v3& message) noexcept {
@@ -52,19 +65,36 @@ command_v2 to_message(const RobotCommand& command) noexcept {
   return message;
 }
 
-bool LinkRobot::read(RobotReading& reading, std::int64_t timeout_ns) noexcept {
-  measurement_v3 message;
-  link_.receive(timeout_ns);
-  if (!link_.take(message)) {
-    return false;
-  }
-  reading = to_reading(message);
-  return true;
+SystemReading to_reading(const signals_measurement_v1& message) noexcept {
+  SystemReading reading;
+  reading.seq = message.seq;
+  reading.taken_ns = message.utime * kNanosecondsPerMicrosecond;
+  std::copy(std::begin(message.value), std::end(message.value), reading.value.begin());
+  return reading;
 }
 
-void LinkRobot::write(const RobotCommand& command) noexcept { link_.send(to_message(command)); }
+signals_command_v1 to_message(const SystemCommand& command) noexcept {
+  signals_command_v1 message{};
+  message.seq = command.seq;
+  message.state = static_cast<std::int32_t>(command.state);
+  message.flags = static_cast<std::int32_t>(command.flags);
+  std::copy(command.input.begin(), command.input.end(), message.input);
+  return message;
+}
 
-RobotRequest LinkRobot::take_request() noexcept {
+template <class Reading, class Command>
+bool LinkPort<Reading, Command>::read(Reading& reading, std::int64_t timeout_ns) noexcept {
+  link_.receive(timeout_ns);
+  return take(link_, reading);
+}
+
+template <class Reading, class Command>
+void LinkPort<Reading, Command>::write(const Command& command) noexcept {
+  link_.send(to_message(command));
+}
+
+template <class Reading, class Command>
+RobotRequest LinkPort<Reading, Command>::take_request() noexcept {
   notice_conflict();
   if (refused_) {
     return RobotRequest::kRefuse;
@@ -83,12 +113,14 @@ RobotRequest LinkRobot::take_request() noexcept {
   return RobotRequest::kNone;
 }
 
-FaultCause LinkRobot::take_fault() noexcept {
+template <class Reading, class Command>
+FaultCause LinkPort<Reading, Command>::take_fault() noexcept {
   notice_conflict();
   return std::exchange(fault_, FaultCause::kNone);
 }
 
-void LinkRobot::notice_conflict() noexcept {
+template <class Reading, class Command>
+void LinkPort<Reading, Command>::notice_conflict() noexcept {
   switch (link_.peers().take_conflict()) {
     case Conflict::kNone:
       break;
@@ -105,8 +137,12 @@ void LinkRobot::notice_conflict() noexcept {
   }
 }
 
-void LinkRobot::announce(ControllerNews news, std::int64_t seq, FaultCause cause) noexcept {
+template <class Reading, class Command>
+void LinkPort<Reading, Command>::announce(ControllerNews news, std::int64_t seq, FaultCause cause) noexcept {
   link_.send(event_code(news), std::max<std::int64_t>(seq, 0), static_cast<std::int64_t>(cause));
 }
+
+template class LinkPort<RobotReading, RobotCommand>;
+template class LinkPort<SystemReading, SystemCommand>;
 
 }  // namespace quasilpv

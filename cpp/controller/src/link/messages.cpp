@@ -36,13 +36,20 @@ void write_big_endian(std::uint64_t value, std::uint8_t* bytes) noexcept {
   }
 }
 
+bool sizes_agree(const event_v2& /*message*/, const WireIdentity& /*identity*/) noexcept { return true; }
+bool sizes_agree(const signals_measurement_v1& message, const WireIdentity& identity) noexcept {
+  return message.signals == identity.signals.states + identity.signals.parameters;
+}
+bool sizes_agree(const signals_command_v1& message, const WireIdentity& identity) noexcept {
+  return message.inputs == identity.signals.inputs;
+}
+bool sizes_agree(const signals_telemetry_v1& message, const WireIdentity& identity) noexcept {
+  return message.states == identity.signals.states && message.inputs == identity.signals.inputs &&
+         message.premises == identity.signals.premises;
+}
 template <class Message>
-bool joints_agree(const Message& message, const WireIdentity& identity) noexcept {
-  if constexpr (std::is_same_v<Message, event_v2>) {
-    return true;
-  } else {
-    return message.joints == identity.joints;
-  }
+bool sizes_agree(const Message& message, const WireIdentity& identity) noexcept {
+  return message.joints == identity.joints;
 }
 
 void copy(const double (&source)[kMaxJoints], JointArray& target) noexcept {
@@ -61,15 +68,20 @@ constexpr bool is_within(std::int64_t value, std::int64_t low, std::int64_t high
 bool is_within_bounds(const measurement_v3& message) noexcept {
   return is_within(message.available, kNoGearSensor, kAllGearSensors);
 }
-bool is_within_bounds(const command_v2& message) noexcept {
-  return is_within(message.state, static_cast<int>(ControllerState::kInit), static_cast<int>(ControllerState::kFault));
+template <class Message>
+bool is_within_bounds(const Message& message) noexcept {
+  if constexpr (kIsCommand<Message>) {
+    return is_within(message.state, static_cast<int>(ControllerState::kInit),
+                     static_cast<int>(ControllerState::kFault));
+  }
+  return true;
 }
 bool is_within_bounds(const event_v2& message) noexcept {
   return is_within(message.source, static_cast<int>(Side::kController), static_cast<int>(Side::kOperator)) &&
-         is_within(message.code, static_cast<int>(EventCode::kStarted), static_cast<int>(EventCode::kReset));
+         is_within(message.code, static_cast<int>(EventCode::kStarted), static_cast<int>(EventCode::kLeftDomain));
 }
 
-/// Angles and torques may be any double: what reads them says what it does with them.
+/// Angles, torques and signals may be any double: what reads them says what it does with them.
 template <class Message>
 bool has_times_within_bounds(const Message& message, std::int64_t period_ns) noexcept {
   constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
@@ -79,7 +91,7 @@ bool has_times_within_bounds(const Message& message, std::int64_t period_ns) noe
 
 template <class Message>
 bool is_possible(const Message& message, const WireIdentity& identity) noexcept {
-  if constexpr (std::is_same_v<Message, telemetry_v2>) {
+  if constexpr (kIsTelemetry<Message>) {
     return has_times_within_bounds(message, identity.period_ns);
   } else {
     return has_times_within_bounds(message, identity.period_ns) && is_within(message.period_ns, 0, kLongestTimeNs) &&
@@ -98,8 +110,9 @@ std::int64_t new_sender() {
 }
 
 const char* channel_name(Channel channel) noexcept {
-  static constexpr std::array<const char*, kChannels> kNames = {"QLPV_MEASUREMENT", "QLPV_COMMAND", "QLPV_TELEMETRY",
-                                                                "QLPV_EVENT"};
+  static constexpr std::array<const char*, kChannels> kNames = {
+      "QLPV_MEASUREMENT",         "QLPV_COMMAND",         "QLPV_TELEMETRY",        "QLPV_EVENT",
+      "QLPV_SIGNALS_MEASUREMENT", "QLPV_SIGNALS_COMMAND", "QLPV_SIGNALS_TELEMETRY"};
   return kNames[static_cast<std::size_t>(channel)];
 }
 
@@ -131,7 +144,7 @@ DecodeStatus decode(const void* bytes, std::size_t size, const WireIdentity& ide
   if (candidate.session != identity.session) {
     return DecodeStatus::kWrongSession;
   }
-  if (candidate.artifact_hash != identity.artifact_hash || !joints_agree(candidate, identity)) {
+  if (candidate.artifact_hash != identity.artifact_hash || !sizes_agree(candidate, identity)) {
     return DecodeStatus::kWrongArtifact;
   }
   return DecodeStatus::kAccepted;
@@ -185,13 +198,35 @@ telemetry_v2 to_message(const TelemetrySample& sample) noexcept {
   return message;
 }
 
+signals_telemetry_v1 to_message(const SystemSample& sample) noexcept {
+  signals_telemetry_v1 message{};
+  message.seq = sample.seq;
+  message.state = static_cast<std::int32_t>(sample.state);
+  message.flags = static_cast<std::int32_t>(sample.flags);
+  message.realtime = sample.realtime ? 1 : 0;
+  message.drops = sample.drops;
+  message.step_ns = sample.step_ns;
+  copy(sample.measured, message.measured);
+  copy(sample.commanded, message.commanded);
+  copy(sample.applied, message.applied);
+  copy(sample.premise, message.premise);
+  message.level = sample.level;
+  return message;
+}
+
 template void encode(const measurement_v3&, Packet&) noexcept;
 template void encode(const command_v2&, Packet&) noexcept;
 template void encode(const telemetry_v2&, Packet&) noexcept;
 template void encode(const event_v2&, Packet&) noexcept;
+template void encode(const signals_measurement_v1&, Packet&) noexcept;
+template void encode(const signals_command_v1&, Packet&) noexcept;
+template void encode(const signals_telemetry_v1&, Packet&) noexcept;
 template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, measurement_v3&) noexcept;
 template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, command_v2&) noexcept;
 template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, telemetry_v2&) noexcept;
 template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, event_v2&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, signals_measurement_v1&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, signals_command_v1&) noexcept;
+template DecodeStatus decode(const void*, std::size_t, const WireIdentity&, signals_telemetry_v1&) noexcept;
 
 }  // namespace quasilpv

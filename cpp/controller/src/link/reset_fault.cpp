@@ -7,12 +7,15 @@
 
 namespace quasilpv {
 
-ResetOutcome request_reset(Link& link, double timeout_s) {
+namespace {
+
+template <class Command>
+ResetOutcome request_reset_of(Link& link, double timeout_s) {
   constexpr std::int64_t kRepeatNs = 100 * kNanosecondsPerMillisecond;
   const std::int64_t end_ns = monotonic_ns() + to_nanoseconds(timeout_s);
   ResetOutcome outcome = ResetOutcome::kSilent;
   std::int64_t asked_ns = monotonic_ns();  // a command says whom to ask, and about which fault: listen first
-  command_v2 command{};
+  Command command{};
   for (std::int64_t now_ns = asked_ns; now_ns < end_ns; now_ns = monotonic_ns()) {
     link.receive(std::min(end_ns, asked_ns + kRepeatNs) - now_ns);
     const bool heard = link.take(command);
@@ -27,6 +30,13 @@ ResetOutcome request_reset(Link& link, double timeout_s) {
     }
   }
   return outcome;
+}
+
+}  // namespace
+
+ResetOutcome request_reset(Link& link, double timeout_s) {
+  return link.identity().is_of_system() ? request_reset_of<signals_command_v1>(link, timeout_s)
+                                        : request_reset_of<command_v2>(link, timeout_s);
 }
 
 }  // namespace quasilpv

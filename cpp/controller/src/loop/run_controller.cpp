@@ -12,11 +12,12 @@ namespace {
 constexpr std::int64_t kLongestWaitNs = 10 * kNanosecondsPerMillisecond;
 constexpr std::int64_t kLongestStopNs = 100 * kNanosecondsPerMillisecond;
 
+template <class Loop, class Port>
 class ControllerRun {
  public:
-  ControllerRun(ControlLoop& loop, Robot& robot, const ControllerRunSettings& settings)
+  ControllerRun(Loop& loop, Port& port, const ControllerRunSettings& settings)
       : loop_(loop),
-        robot_(robot),
+        port_(port),
         settings_(settings),
         period_ns_(to_nanoseconds(loop.sample_period_s())),
         silence_ns_(to_nanoseconds(settings.silence_s)),
@@ -24,27 +25,27 @@ class ControllerRun {
         last_heard_ns_(monotonic_ns()) {}
 
   ControllerRunReport run(const std::atomic<bool>& stop) noexcept {
-    robot_.announce(ControllerNews::kStarted, 0, FaultCause::kNone);
+    port_.announce(ControllerNews::kStarted, 0, FaultCause::kNone);
     std::optional<ControllerRunEnd> end;
     while (!end) {
-      RobotReading reading;
-      const bool read = robot_.read(reading, wait_ns());
+      typename Loop::Reading reading{};
+      const bool read = port_.read(reading, wait_ns());
       now_ns_ = monotonic_ns();
       if (stop.load(std::memory_order_relaxed) && !stop_since_ns_) {
         stop_since_ns_ = now_ns_;
       }
-      notice(robot_.take_fault());
+      notice(port_.take_fault());
       answer_silence();  // first: a reading that ends a silence, as after a stop of both sides, must not hide it
       if (read) {
         answer(reading);
       }
       end = find_end();
     }
-    notice(robot_.take_fault());
+    notice(port_.take_fault());
     if (!loop_.started() && report_.robot_fault != FaultCause::kNone) {
-      robot_.announce(ControllerNews::kFault, 0, report_.robot_fault);  // no sample will say so
+      port_.announce(ControllerNews::kFault, 0, report_.robot_fault);  // no sample will say so
     }
-    robot_.announce(ControllerNews::kEnded, loop_.last_seq(), loop_.cause());
+    port_.announce(ControllerNews::kEnded, loop_.last_seq(), loop_.cause());
     report_.end = *end;
     return report_;
   }
@@ -56,7 +57,7 @@ class ControllerRun {
   std::int64_t policy_clock(std::int64_t seq) const noexcept { return is_real_time() ? now_ns_ : seq * period_ns_; }
 
   SampleConditions conditions(std::int64_t seq) noexcept {
-    return {policy_clock(seq), consecutive_overruns_, robot_.take_longest_foreign_run(), stop_since_ns_.has_value(),
+    return {policy_clock(seq), consecutive_overruns_, port_.take_longest_foreign_run(), stop_since_ns_.has_value(),
             std::exchange(demanded_, FaultCause::kNone)};
   }
 
@@ -74,25 +75,25 @@ class ControllerRun {
     return std::clamp<std::int64_t>(until - monotonic_ns(), 0, kLongestWaitNs);
   }
 
-  void answer(const RobotReading& reading) noexcept {
+  void answer(const typename Loop::Reading& reading) noexcept {
     last_heard_ns_ = now_ns_;
     silent_pacer_.reset();
     if (loop_.is_new(reading.seq)) {
       report_.arrival.add(now_ns_ - reading.taken_ns);
       loop_.handle(reading, conditions(reading.seq));
-      if (loop_.refusal()) {
+      if (loop_.has_refused()) {
         return;
       }
       send_command();
       count_overrun();
     } else if (!is_real_time() && reading.seq == loop_.last_seq()) {
-      robot_.write(loop_.command());
+      port_.write(loop_.command());
       ++report_.commands;
       ++report_.repeated;
     }
   }
 
-  // The path of the measurements may be broken while that of the commands is not: keep commanding the safe torque.
+  // The path of the measurements may be broken while that of the commands is not: keep commanding what is safe.
   void answer_silence() noexcept {
     if (!is_real_time() || !loop_.started() || now_ns_ - last_heard_ns_ < silence_ns_) {
       return;
@@ -108,11 +109,11 @@ class ControllerRun {
   }
 
   void send_command() noexcept {
-    robot_.write(loop_.command());
+    port_.write(loop_.command());
     ++report_.commands;
     if (loop_.faults() > faults_announced_) {
       faults_announced_ = loop_.faults();
-      robot_.announce(ControllerNews::kFault, loop_.last_seq(), loop_.cause());
+      port_.announce(ControllerNews::kFault, loop_.last_seq(), loop_.cause());
     }
   }
 
@@ -128,10 +129,10 @@ class ControllerRun {
   }
 
   std::optional<ControllerRunEnd> find_end() noexcept {
-    if (loop_.refusal()) {
+    if (loop_.has_refused()) {
       return ControllerRunEnd::kStartRefused;
     }
-    const RobotRequest request = robot_.take_request();
+    const RobotRequest request = port_.take_request();
     if (request == RobotRequest::kEnd) {
       return ControllerRunEnd::kPlantEnded;
     }
@@ -157,8 +158,8 @@ class ControllerRun {
     return std::nullopt;
   }
 
-  ControlLoop& loop_;
-  Robot& robot_;
+  Loop& loop_;
+  Port& port_;
   ControllerRunSettings settings_;
   std::int64_t period_ns_;
   std::int64_t silence_ns_;
@@ -198,6 +199,11 @@ const char* to_string(ControllerRunEnd end) noexcept {
 ControllerRunReport run_controller(ControlLoop& loop, Robot& robot, const ControllerRunSettings& settings,
                                    const std::atomic<bool>& stop) noexcept {
   return ControllerRun(loop, robot, settings).run(stop);
+}
+
+ControllerRunReport run_controller(SystemLoop& loop, SystemPort& system, const ControllerRunSettings& settings,
+                                   const std::atomic<bool>& stop) noexcept {
+  return ControllerRun(loop, system, settings).run(stop);
 }
 
 }  // namespace quasilpv

@@ -14,12 +14,23 @@ void append_number(std::string& row, Number value) {
   row.append(digits.data(), end);
 }
 
+std::string quoted_if_needed(const std::string& name) {
+  if (name.find_first_of(",\"\r\n") == std::string::npos) {
+    return name;
+  }
+  std::string quoted = "\"";
+  for (const char character : name) {
+    quoted += character == '"' ? "\"\"" : std::string(1, character);
+  }
+  return quoted + "\"";
+}
+
 }  // namespace
 
 void CsvWriter::head(const std::string& name, int width) {
   for (int i = 0; i < width; ++i) {
     separate();
-    row_ += width > 1 ? name + "_" + std::to_string(i) : name;
+    row_ += quoted_if_needed(width > 1 ? name + "_" + std::to_string(i) : name);
   }
 }
 

@@ -15,6 +15,7 @@
 #include "quasilpv/proved_limits.hpp"
 #include "quasilpv/robot.hpp"
 #include "quasilpv/safe_torque.hpp"
+#include "quasilpv/sample_conditions.hpp"
 #include "quasilpv/telemetry_ring.hpp"
 #include "quasilpv/trajectory.hpp"
 
@@ -28,15 +29,6 @@ struct LoopSettings {
   /// reference, or while the arm moves, is free of bumps; after a reset that is always so. Off: the law is told the
   /// reference as it is, from the first sample on.
   bool bumpless_start = false;
-};
-
-/// What only the caller can know about a sample.
-struct SampleConditions {
-  std::int64_t now_ns = 0;                ///< clock of the fail-safe policy: monotonic, or seq T in lock-step
-  std::int64_t consecutive_overruns = 0;  ///< samples before this one that took longer than their period
-  std::int64_t consecutive_foreign = 0;   ///< Robot::take_longest_foreign_run()
-  bool stop_requested = false;
-  FaultCause demanded = FaultCause::kNone;  ///< Robot::take_fault()
 };
 
 /// Turns the reading of sample k into the command of sample k:
@@ -56,6 +48,8 @@ struct SampleConditions {
 /// on SampleConditions only.
 class ControlLoop {
  public:
+  using Reading = RobotReading;
+
   /// INIT-ONLY. Throws InputError if artifact and trajectory differ in the number of joints.
   ControlLoop(const Artifact& artifact, const Trajectory& trajectory, const LoopSettings& settings);
 
@@ -72,6 +66,7 @@ class ControlLoop {
   /// Why there was no start, if the first finite reading was outside the operating domain. The state is then Fault and
   /// there is no command: none must be sent.
   const std::optional<StartRefusal>& refusal() const noexcept { return refusal_; }
+  bool has_refused() const noexcept { return refusal_.has_value(); }
 
   /// The next sample without a measurement, because the plant is silent: latches a fault and moves the command towards
   /// the safe torque. RT-SAFE (bounded, no allocation, no lock, no throw).

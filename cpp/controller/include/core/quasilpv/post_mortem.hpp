@@ -11,11 +11,14 @@ namespace quasilpv {
 
 /// Ring of the last 50 samples, the one that latched the fault included. keep() sets them aside until the next fault.
 /// RT-SAFE (bounded, no allocation, no lock, no throw).
-class PostMortem {
+///
+/// @tparam Sample  trivially copyable
+template <class Sample>
+class LastSamples {
  public:
   static constexpr std::size_t kCapacity = 50;
 
-  void add(const TelemetrySample& sample) noexcept {
+  void add(const Sample& sample) noexcept {
     recent_[next_] = sample;
     next_ = (next_ + 1) % kCapacity;
     count_ = count_ < kCapacity ? count_ + 1 : kCapacity;
@@ -32,14 +35,17 @@ class PostMortem {
   /// Number of samples set aside, 0 without a fault.
   std::size_t size() const noexcept { return kept_count_; }
   /// Sample i of those set aside, the oldest first; i < size().
-  const TelemetrySample& operator[](std::size_t i) const noexcept { return kept_[i]; }
+  const Sample& operator[](std::size_t i) const noexcept { return kept_[i]; }
 
  private:
-  std::array<TelemetrySample, kCapacity> recent_{};
-  std::array<TelemetrySample, kCapacity> kept_{};
+  std::array<Sample, kCapacity> recent_{};
+  std::array<Sample, kCapacity> kept_{};
   std::size_t next_ = 0;
   std::size_t count_ = 0;
   std::size_t kept_count_ = 0;
 };
+
+/// Those of a robot.
+using PostMortem = LastSamples<TelemetrySample>;
 
 }  // namespace quasilpv

@@ -8,6 +8,8 @@
 #include "quasilpv/loop.hpp"
 #include "quasilpv/pacer.hpp"
 #include "quasilpv/robot.hpp"
+#include "quasilpv/system_loop.hpp"
+#include "quasilpv/system_port.hpp"
 
 namespace quasilpv {
 
@@ -15,16 +17,16 @@ struct ControllerRunSettings {
   Pace pace = Pace::kLockStep;
   double timeout_s = 10.0;     ///< without any measurement: end of the run
   double silence_s = 0.02;     ///< real time: without a measurement after the first: fault
-  bool exit_on_fault = false;  ///< end the run once the safe torque is reached
+  bool exit_on_fault = false;  ///< end the run once the safe command is reached
 };
 
 /// How a run ended.
 enum class ControllerRunEnd {
   kPlantEnded,      ///< the robot's side said so
-  kStopped,         ///< SIGINT or SIGTERM; the safe torque was sent
+  kStopped,         ///< SIGINT or SIGTERM; the safe command was sent
   kFault,           ///< `exit_on_fault`
   kRefused,         ///< the robot's side runs in another way
-  kStartRefused,    ///< ControlLoop::refusal(); no command was sent
+  kStartRefused,    ///< the first measurement is no start, see ControlLoop::refusal(); no command was sent
   kPlantSilent,     ///< no measurement for `timeout_s`
   kPlantNeverHeard  ///< no measurement at all
 };
@@ -38,7 +40,7 @@ struct ControllerRunReport {
   std::int64_t repeated = 0;                   ///< lock-step: answered again
   std::int64_t resets = 0;                     ///< faults left on request
   std::int64_t deadline_overruns = 0;          ///< real time: answered later than one period after its arrival
-  LatencyHistogram arrival;                    ///< RobotReading::taken_ns to wake-up; meaningful on one machine only
+  LatencyHistogram arrival;                    ///< `taken_ns` of the reading to wake-up; meaningful on one machine only
   LatencyHistogram response;                   ///< wake-up to command sent
 };
 
@@ -50,6 +52,10 @@ struct ControllerRunReport {
 ///
 /// @param stop  set by a signal handler or another thread
 ControllerRunReport run_controller(ControlLoop& loop, Robot& robot, const ControllerRunSettings& settings,
+                                   const std::atomic<bool>& stop) noexcept;
+
+/// The same of a general system.
+ControllerRunReport run_controller(SystemLoop& loop, SystemPort& system, const ControllerRunSettings& settings,
                                    const std::atomic<bool>& stop) noexcept;
 
 }  // namespace quasilpv

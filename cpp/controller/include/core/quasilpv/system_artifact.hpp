@@ -36,9 +36,12 @@ class SystemArtifact {
   static SystemArtifact load(const std::string& path);
   /// The same from bytes; `source` names them in errors. INIT-ONLY. Throws InputError.
   static SystemArtifact parse(std::string_view bytes, const std::string& source);
+  /// Whether a file says that it is one, whatever else is in it. INIT-ONLY. Throws InputError if it is no document.
+  static bool is_in(const std::string& path);
 
   const std::string& name() const noexcept { return name_; }
   const std::string& hash() const noexcept { return hash_; }
+  std::int64_t hash_prefix() const noexcept { return hash_prefix_; }  ///< the first eight bytes, big endian
   double sample_period_s() const noexcept { return sample_period_s_; }
 
   const std::vector<SystemSignal>& states() const noexcept { return states_; }
@@ -62,6 +65,7 @@ class SystemArtifact {
 
   std::string name_;
   std::string hash_;
+  std::int64_t hash_prefix_ = 0;
   double sample_period_s_ = 0.0;
   std::vector<SystemSignal> states_;
   std::vector<SystemSignal> inputs_;

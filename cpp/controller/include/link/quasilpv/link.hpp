@@ -23,7 +23,7 @@ struct LinkCounters {
   std::int64_t wrong_checksum = 0;
   std::int64_t wrong_type = 0;
   std::int64_t wrong_session = 0;
-  std::int64_t wrong_artifact = 0;     ///< hash or number of joints differ
+  std::int64_t wrong_artifact = 0;     ///< hash or number of joints or signals differ
   std::int64_t out_of_bounds = 0;      ///< a number or code that no side sends
   std::int64_t second_sender = 0;      ///< of another sender than the peer, or for another receiver, or a contradiction
   std::int64_t other_mode = 0;         ///< of a sender that runs in another mode or at another rate
@@ -57,6 +57,10 @@ class Link {
   void send(const command_v2& message) noexcept;
   void send(const telemetry_v2& message) noexcept;
   void send(const TelemetrySample& sample) noexcept { send(to_message(sample)); }
+  void send(const signals_measurement_v1& message) noexcept;
+  void send(const signals_command_v1& message) noexcept;
+  void send(const signals_telemetry_v1& message) noexcept;
+  void send(const SystemSample& sample) noexcept { send(to_message(sample)); }
   void send(EventCode code, std::int64_t seq, std::int64_t detail = 0, std::int64_t more = 0) noexcept;
 
   /// Waits until at least one packet arrived or `timeout_ns` passed (0: polls), then drains all. RT-UNSAFE (system
@@ -67,6 +71,8 @@ class Link {
   /// be taken again: lock-step answers it. RT-SAFE.
   bool take(measurement_v3& message) noexcept { return measurement_.take(message); }
   bool take(command_v2& message) noexcept { return command_.take(message); }
+  bool take(signals_measurement_v1& message) noexcept { return signals_measurement_.take(message); }
+  bool take(signals_command_v1& message) noexcept { return signals_command_.take(message); }
 
   /// Takes the oldest event out: each of them counts, so they are kept in order, at most 8. RT-SAFE.
   bool take(event_v2& event) noexcept { return events_.take(event); }
@@ -127,6 +133,8 @@ class Link {
     std::size_t count = 0;
   };
 
+  template <class Command>
+  void send_command(const Command& message) noexcept;
   template <class Message>
   void seal_and_transmit(Message message) noexcept;
   template <class Message>
@@ -154,6 +162,8 @@ class Link {
   std::int64_t longest_wrong_run_ = 0;
   Inbox<measurement_v3> measurement_;
   Inbox<command_v2> command_;
+  Inbox<signals_measurement_v1> signals_measurement_;
+  Inbox<signals_command_v1> signals_command_;
   EventQueue events_;
   std::int64_t last_command_seq_ = -1;  // sent
   std::int64_t fault_seq_ = -1;         // of the first command of the latched fault; -1: not in fault
