@@ -45,23 +45,11 @@ py::array_t<double> column_to_numpy(const Record::Column& column) {
   return result;
 }
 
-py::dict simulate(const SystemArtifact& artifact, const std::vector<double>& start,
-                  const std::vector<double>& parameter, std::int64_t samples, int rk4_steps, double tolerance,
-                  double delay_s) {
-  SystemExperiment experiment;
-  experiment.start = start;
-  experiment.parameter = parameter;
-  experiment.samples = samples;
-  experiment.delay_s = delay_s;
-  if (rk4_steps > 0) {
-    experiment.integrator = Rk4Options{rk4_steps};
-  } else {
-    experiment.integrator = IdaOptions{tolerance, 0.01 * tolerance};
-  }
+py::dict simulate(const SystemArtifact& artifact, const SystemScenario& scenario) {
   SystemRun run;
   {
     const py::gil_scoped_release release;
-    run = simulate_system(artifact, experiment);
+    run = simulate_system(artifact, scenario);
   }
   py::dict columns;
   for (const Record::Column& column : run.samples.columns()) {
@@ -71,7 +59,8 @@ py::dict simulate(const SystemArtifact& artifact, const std::vector<double>& sta
   result["columns"] = columns;
   result["flags"] = run.flags;
   if (run.exit) {
-    result["exit"] = py::make_tuple(run.exit->time_s, run.exit->signal);
+    result["exit"] =
+        py::make_tuple(run.exit->time_s, artifact.states()[static_cast<std::size_t>(run.exit->state)].name);
   } else {
     result["exit"] = py::none();
   }
@@ -98,10 +87,19 @@ void bind_system(py::module_& module) {
       .def("step", &step, py::arg("state"), py::arg("parameter"),
            "One step: flags, input, commanded, premise, level; signals with their trim.");
 
-  module.def("simulate_system", &simulate, py::arg("artifact"), py::arg("start"), py::arg("parameter"),
-             py::arg("samples"), py::arg("rk4_steps"), py::arg("tolerance"), py::arg("delay_s"),
-             "The closed loop in lock-step, IDA for rk4_steps = 0: columns (samples, width), flags, and where a state "
-             "left its domain. Releases the GIL.");
+  py::class_<SystemScenario>(module, "SystemScenario", "What happens to a general system in one run.")
+      .def_static(
+          "parse",
+          [](const py::bytes& data, const std::string& source, const SystemArtifact& artifact) {
+            return SystemScenario::parse(static_cast<std::string_view>(data), source, artifact);
+          },
+          py::arg("data"), py::arg("source"), py::arg("artifact"), "Strict reading of JSON, for this artifact.")
+      .def_readonly("name", &SystemScenario::name)
+      .def_readonly("samples", &SystemScenario::samples);
+
+  module.def("simulate_system", &simulate, py::arg("artifact"), py::arg("scenario"),
+             "The closed loop in lock-step: columns (samples, width), flags, and where a state left its domain. "
+             "Releases the GIL.");
 }
 
 }  // namespace quasilpv::bindings

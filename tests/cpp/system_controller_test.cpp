@@ -86,7 +86,7 @@ TEST(EquationPlant, has_the_residual_the_slope_and_the_rates_of_its_equations) {
 
 TEST(SystemSimulation, settles_the_pendulum_the_same_under_both_integrators) {
   const SystemArtifact artifact = pendulum();
-  SystemExperiment experiment;
+  SystemScenario experiment;
   experiment.start = {1.2, 0.0};
   experiment.samples = 500;
   experiment.integrator = IdaOptions{1e-10, 1e-12};
@@ -105,18 +105,18 @@ TEST(SystemSimulation, settles_the_pendulum_the_same_under_both_integrators) {
 }
 
 TEST(SystemSimulation, ends_where_a_state_leaves_its_domain) {
-  SystemExperiment experiment;
+  SystemScenario experiment;
   experiment.start = {2.49, 9.0};
   experiment.samples = 100;
   const SystemRun run = simulate_system(pendulum(), experiment);
   ASSERT_TRUE(run.exit.has_value());
-  EXPECT_EQ(run.exit->signal, "x");
+  EXPECT_EQ(run.exit->state, 0);
   EXPECT_LT(run.samples["time_s"].samples(), 5U);
 }
 
 TEST(SystemSimulation, delays_an_input_by_at_most_one_sample) {
   const SystemArtifact artifact = pendulum();
-  SystemExperiment experiment;
+  SystemScenario experiment;
   experiment.start = {1.2, 0.0};
   experiment.samples = 50;
   experiment.delay_s = artifact.sample_period_s();

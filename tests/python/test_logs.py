@@ -21,6 +21,7 @@ from quasilpv.cli import run
 from quasilpv.errors import InputError
 from quasilpv.experiments.hil import run_over_lcm
 from quasilpv.experiments.logged import logged_result, mechanism_of
+from quasilpv.experiments.processes import Talk
 from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.experiments.track import track
@@ -355,7 +356,7 @@ def test_when_two_processes_talk_expect_their_traffic_in_the_log_and_a_replay_bi
     monkeypatch.setenv("PATH", str(Path(executable("qlpv-simulator")).parent), prepend=":")
     executable("qlpv-controller")
     run_over_lcm(
-        RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors()), tmp_path, mode="lockstep"
+        RunSetup(logged_experiment, logged_artifact, plant="perturbed", sensors=Sensors()), tmp_path, Talk("lockstep")
     )
     heard, made = read_log(tmp_path / LOG_NAME), read_log(tracked[1])
     for channel, own in COMPARED:

@@ -21,6 +21,7 @@ from quasilpv.experiments import designs
 from quasilpv.experiments.disturbance import true_disturbance
 from quasilpv.experiments.hil import merge_records, read_record, require_identical, run_over_lcm
 from quasilpv.experiments.metrics import compute_metrics
+from quasilpv.experiments.processes import Talk
 from quasilpv.experiments.result import TrackResult
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.experiments.track import run_from_columns, track
@@ -297,7 +298,7 @@ def test_when_controller_and_plant_are_two_processes_in_lock_step_expect_identic
             sensors=Sensors(),
         ),
         tmp_path,
-        mode="lockstep",
+        Talk("lockstep"),
     )
     in_process = results["serial-circle", "dob-acceleration"]
     require_identical(over_lcm.result.run, in_process.run)

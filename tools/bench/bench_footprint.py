@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from bench_programs import Experiment, ProgramError, costs, run_in_turns
 from bench_report import Report, main, row
 
-from quasilpv.experiments.hil import find_executable
+from quasilpv.experiments.processes import find_executable
 
 URL = "udpm://239.255.76.67:7693?ttl=0"  # a port of its own: no other run is disturbed or listened to
 COMPETITOR = "Python with numpy, idle"

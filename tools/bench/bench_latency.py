@@ -14,7 +14,7 @@ from typing import Any
 from bench_programs import Documents, Experiment, ProgramError, costs, run_in_turns
 from bench_report import Report, Row, main, row
 
-from quasilpv.experiments.hil import find_executable
+from quasilpv.experiments.processes import find_executable
 
 URL = "udpm://239.255.76.67:7692?ttl=0"  # a port of its own: no other run is disturbed or listened to
 UNPRIVILEGED = (

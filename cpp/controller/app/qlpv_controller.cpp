@@ -1,5 +1,5 @@
-// qlpv-controller: one artifact, one trajectory, one run over LCM; a doctor; a reset. Contract:
-// docs/reference/messages.md
+// qlpv-controller: one artifact, of a robot with a trajectory or of a system, one run over LCM; a doctor; a reset.
+// Contract: docs/reference/messages.md
 #include <algorithm>
 #include <atomic>
 #include <iostream>
@@ -15,6 +15,7 @@
 #include "quasilpv/loop.hpp"
 #include "quasilpv/reset_fault.hpp"
 #include "quasilpv/run_controller.hpp"
+#include "quasilpv/system_loop.hpp"
 #include "quasilpv/telemetry_publisher.hpp"
 #include "quasilpv/trajectory.hpp"
 
@@ -35,16 +36,20 @@ void declare_all(CLI::App& app, Options& options) {
       "\n\nAlso: qlpv-controller --doctor (will this machine hold the rate?), qlpv-controller --reset-fault (leave "
       "a latched fault); each has its own --help.");
   declare(app, options.common);
-  add_file(app, "trajectory", options.trajectory, "the reference, JSON or CBOR")->required();
+  add_file(app, "trajectory", options.trajectory, "the reference, JSON or CBOR; of robots, which need one");
   add_word<SafeAction>(app, "safe-action", options.loop.safe_action,
                        {{"zero", SafeAction::kZero}, {"gravity", SafeAction::kGravity}},
-                       "torque after a fault; gravity: minus damping");
+                       "of robots: torque after a fault; gravity: minus damping");
   add_time(app, "silence-s", options.run.silence_s, "realtime: fault after so long without a measurement");
   add_switch(app, "exit-on-fault", options.run.exit_on_fault, "end the run once a fault has led to the safe torque");
 }
 
-Json describe(const ControlLoop& loop, const ControllerRunReport& run, const TelemetryReport& telemetry,
-              const Link& link, bool realtime) {
+Json post_mortem_of(const ControlLoop& loop) { return to_json(loop.post_mortem(), loop.cause(), loop.joints()); }
+Json post_mortem_of(const SystemLoop& loop) { return to_json(loop.post_mortem(), loop.cause(), loop.artifact()); }
+
+template <class Loop>
+Json describe(const Loop& loop, const ControllerRunReport& run, const TelemetryReport& telemetry, const Link& link,
+              bool realtime) {
   return {{"end", to_string(run.end)},
           {"state", to_string(loop.state())},
           {"fault_cause", to_string(loop.cause())},
@@ -69,13 +74,17 @@ Json describe(const ControlLoop& loop, const ControllerRunReport& run, const Tel
             {"drops", telemetry.drops},
             {"record_drops", telemetry.record_drops},
             {"send_failures", telemetry.send_failures}}},
-          {"post_mortem", to_json(loop.post_mortem(), loop.cause(), loop.joints())}};
+          {"post_mortem", post_mortem_of(loop)}};
 }
 
+std::string refused_start(const ControlLoop& loop) { return loop.refusal() ? to_string(*loop.refusal()) : ""; }
+std::string refused_start(const SystemLoop& /*loop*/) { return ""; }
+
 /// Why the run counts as stopped by a fault; empty if it does not.
-std::string fault_stop_reason(const ControlLoop& loop, const ControllerRunReport& run, const Link& link) {
-  if (loop.refusal()) {
-    return to_string(*loop.refusal());
+template <class Loop>
+std::string fault_stop_reason(const Loop& loop, const ControllerRunReport& run, const Link& link) {
+  if (std::string refusal = refused_start(loop); !refusal.empty()) {
+    return refusal;
   }
   if (loop.state() == ControllerState::kFault && loop.cause() != FaultCause::kStopRequested) {
     return naming(to_string(loop.cause()), link);
@@ -86,7 +95,8 @@ std::string fault_stop_reason(const ControlLoop& loop, const ControllerRunReport
   return run.end == ControllerRunEnd::kPlantSilent ? to_string(run.end) : "";
 }
 
-int exit_code(const ControlLoop& loop, const ControllerRunReport& run, const Link& link, const CommonOptions& options) {
+template <class Loop>
+int exit_code(const Loop& loop, const ControllerRunReport& run, const Link& link, const CommonOptions& options) {
   if (run.end == ControllerRunEnd::kRefused) {
     throw_refused(options, link, "the plant");
   }
@@ -101,37 +111,73 @@ int exit_code(const ControlLoop& loop, const ControllerRunReport& run, const Lin
   return reason.empty() ? kExitDone : report_fault_stop("qlpv-controller", reason, loop.last_seq());
 }
 
-int run(const CLI::App& app, Options& options) {
+/// One run of a loop over LCM, from its first reading to its report.
+///
+/// @param make_publisher  of the loop's samples, on a link of its own
+template <class Port, class Loop, class MakePublisher>
+int run_loop(Loop& loop, const Options& options, const WireIdentity& identity, MakePublisher make_publisher,
+             bool realtime) {
   const CommonOptions& common = options.common;
-  const Artifact artifact = Artifact::load(common.artifact);
-  const Trajectory trajectory = Trajectory::load(options.trajectory);
-  const std::atomic<bool>& stop = install_stop_signals();
-  std::unique_ptr<OutputFile> record = open_record(common, "qlpv-controller", options.trajectory);
-  options.loop.realtime = apply_priority(app, common);
-  // In lock-step a run is the run in process, bit for bit; there is no arm that a bump could harm.
-  options.loop.bumpless_start = common.pace == Pace::kRealTime;
-  ControlLoop loop(artifact, trajectory, options.loop);
-
-  const WireIdentity identity = identity_of(common, artifact);
   LcmLink link(Side::kController, identity, common.url, common.allow_network);
   apply_key(common, link);
-  auto telemetry_link =
-      std::make_unique<LcmLink>(Side::kController, identity, common.url, common.allow_network, Listen::kNothing);
-  TelemetryPublisher publisher(std::move(telemetry_link), artifact.sample_period_s(), artifact.joints(),
-                               std::move(record));
-
-  options.run.pace = common.pace;
-  options.run.timeout_s = common.timeout_s;
-  loop.publish_to(&publisher.ring());
-  LinkRobot robot(link);
-  const ControllerRunReport report = run_controller(loop, robot, options.run, stop);
-  const TelemetryReport telemetry = publisher.stop();
-  print_report(std::cout, describe(loop, report, telemetry, link, options.loop.realtime), common.json);
+  const auto publisher = make_publisher(
+      std::make_unique<LcmLink>(Side::kController, identity, common.url, common.allow_network, Listen::kNothing));
+  ControllerRunSettings settings = options.run;
+  settings.pace = common.pace;
+  settings.timeout_s = common.timeout_s;
+  loop.publish_to(&publisher->ring());
+  Port port(link);
+  const ControllerRunReport report = run_controller(loop, port, settings, install_stop_signals());
+  const TelemetryReport telemetry = publisher->stop();
+  print_report(std::cout, describe(loop, report, telemetry, link, realtime), common.json);
   if (telemetry.record_drops > 0) {
     std::cerr << "qlpv-controller: warning: " << common.record << ": " << telemetry.record_drops
               << " rows of the record were lost\n";
   }
   return exit_code(loop, report, link, common);
+}
+
+int run_robot(const CLI::App& app, Options& options) {
+  const CommonOptions& common = options.common;
+  if (options.trajectory.empty()) {
+    throw InputError("command line", "trajectory", "nothing", "the reference of the robot");
+  }
+  const Artifact artifact = Artifact::load(common.artifact);
+  const Trajectory trajectory = Trajectory::load(options.trajectory);
+  install_stop_signals();
+  std::unique_ptr<OutputFile> record = open_record(common, "qlpv-controller", options.trajectory);
+  options.loop.realtime = apply_priority(app, common);
+  // In lock-step a run is the run in process, bit for bit; there is no arm that a bump could harm.
+  options.loop.bumpless_start = common.pace == Pace::kRealTime;
+  ControlLoop loop(artifact, trajectory, options.loop);
+  const auto publisher = [&](std::unique_ptr<Link> link) {
+    return std::make_unique<TelemetryPublisher>(std::move(link), artifact.sample_period_s(), artifact.joints(),
+                                                std::move(record));
+  };
+  return run_loop<LinkRobot>(loop, options, identity_of(common, artifact), publisher, options.loop.realtime);
+}
+
+int run_system(const CLI::App& app, const Options& options) {
+  const CommonOptions& common = options.common;
+  for (const char* name : {"trajectory", "safe-action"}) {
+    if (app.count(std::string("--") + name) > 0) {
+      throw InputError("command line", name, "a value", "nothing beside the artifact of a system");
+    }
+  }
+  const SystemArtifact artifact = SystemArtifact::load(common.artifact);
+  install_stop_signals();
+  std::unique_ptr<OutputFile> record = open_record(common, "qlpv-controller", "");
+  SystemLoopSettings settings;
+  settings.realtime = apply_priority(app, common);
+  SystemLoop loop(artifact, settings);
+  const auto publisher = [&](std::unique_ptr<Link> link) {
+    return std::make_unique<SystemPublisher>(std::move(link), artifact, std::move(record));
+  };
+  return run_loop<LinkSystem>(loop, options, identity_of(common, artifact), publisher, settings.realtime);
+}
+
+int run(const CLI::App& app, Options& options) {
+  return SystemArtifact::is_in(options.common.artifact) ? run_system(app, options) : run_robot(app, options);
 }
 
 struct DoctorOptions {
@@ -242,8 +288,10 @@ void declare_reset(CLI::App& app, ResetOptions& reset) {
 }
 
 int run_reset(const CommonOptions& options) {
-  const Artifact artifact = Artifact::load(options.artifact);
-  LcmLink link(Side::kOperator, identity_of(options, artifact), options.url, options.allow_network);
+  const WireIdentity identity = SystemArtifact::is_in(options.artifact)
+                                    ? identity_of(options, SystemArtifact::load(options.artifact))
+                                    : identity_of(options, Artifact::load(options.artifact));
+  LcmLink link(Side::kOperator, identity, options.url, options.allow_network);
   apply_key(options, link);
   switch (request_reset(link, options.timeout_s)) {
     case ResetOutcome::kLeft:

@@ -11,6 +11,8 @@
 #include "quasilpv/lcm_link.hpp"
 #include "quasilpv/plant_loop.hpp"
 #include "quasilpv/scenario.hpp"
+#include "quasilpv/system_scenario.hpp"
+#include "quasilpv/system_session.hpp"
 
 namespace {
 
@@ -28,7 +30,8 @@ void declare_all(CLI::App& app, Options& options) {
   declare(app, options.common);
   add_file(app, "scenario", options.scenario, "the experiment, true plant included")->required();
   add_time(app, "hold-s", options.run.hold_s, "realtime: the watchdog brakes after so long without a command");
-  add_time(app, "brake-time-constant-s", options.brake_time_constant_s, "realtime: of the watchdog's viscous brake");
+  add_time(app, "brake-time-constant-s", options.brake_time_constant_s,
+           "realtime, robots: of the watchdog's viscous brake");
 }
 
 Json describe(const PlantRunReport& run, const Link& link, bool realtime) {
@@ -97,7 +100,35 @@ int exit_code(const PlantRunReport& run, const Link& link, const CommonOptions& 
   return reason.empty() ? kExitDone : report_fault_stop("qlpv-simulator", reason, run.samples);
 }
 
-int run(const CLI::App& app, Options& options) {
+/// One run of a session over LCM, from its first measurement to its report. `explain` adds to the report what only this
+/// kind of plant has to say, and returns why it ended too early, if it did.
+template <class Session, class Explain>
+int run_session(Session& session, const Options& options, const WireIdentity& identity, OutputFile* file, bool realtime,
+                Explain explain) {
+  const CommonOptions& common = options.common;
+  const std::atomic<bool>& stop = install_stop_signals();
+  LcmLink link(Side::kPlant, identity, common.url, common.allow_network);
+  apply_key(common, link);
+  Record record;
+  PlantRunReport report;
+  try {
+    report = run_plant(session, link, options.run, file != nullptr ? &record : nullptr, stop);
+  } catch (const PlantError&) {
+    write(record, file, common.record);  // what led to the failure
+    throw;
+  }
+  const bool recorded = write(record, file, common.record);
+  Json described = describe(report, link, realtime);
+  const std::string reason = explain(described);
+  print_report(std::cout, described, common.json);
+  int code = exit_code(report, link, common);
+  if (code == kExitDone && !reason.empty()) {
+    code = report_fault_stop("qlpv-simulator", reason, report.samples);
+  }
+  return code == kExitDone && !recorded ? kExitBadInput : code;
+}
+
+int run_robot(const CLI::App& app, Options& options) {
   const CommonOptions& common = options.common;
   const Artifact artifact = Artifact::load(common.artifact);
   const Scenario scenario = Scenario::load(options.scenario);
@@ -105,30 +136,46 @@ int run(const CLI::App& app, Options& options) {
     throw InputError(options.scenario, "plant", std::to_string(scenario.joints()) + " joints",
                      std::to_string(artifact.joints()) + " as in artifact '" + artifact.name() + "'");
   }
-  const std::atomic<bool>& stop = install_stop_signals();
+  install_stop_signals();
   const std::unique_ptr<OutputFile> file = open_record(common, "qlpv-simulator", options.scenario);
   PlantSession session(scenario, artifact.sample_period_s());
   const bool realtime = apply_priority(app, common);
-  const WireIdentity identity = identity_of(common, artifact);
-  LcmLink link(Side::kPlant, identity, common.url, common.allow_network);
-  apply_key(common, link);
-
-  options.run.pace = common.pace;
-  options.run.timeout_s = common.timeout_s;
   options.run.torque_limit_nm = artifact.limits().torque_nm;
   options.run.brake_nm_s = viscous_brake(scenario, options.brake_time_constant_s);
-  Record record;
-  PlantRunReport report;
-  try {
-    report = run_plant(session, link, options.run, file != nullptr ? &record : nullptr, stop);
-  } catch (const PlantError&) {
-    write(record, file.get(), common.record);  // what led to the failure
-    throw;
+  return run_session(session, options, identity_of(common, artifact), file.get(), realtime,
+                     [](Json& /*report*/) { return std::string(); });
+}
+
+/// Says in the report where the system left its domain, and returns it in words.
+std::string explain_exit(const SystemSession& session, Json& report) {
+  report["left_domain"] = nullptr;
+  if (!session.exit()) {
+    return "";
   }
-  const bool recorded = write(record, file.get(), common.record);
-  print_report(std::cout, describe(report, link, realtime), common.json);
-  const int code = exit_code(report, link, common);
-  return code == kExitDone && !recorded ? kExitBadInput : code;
+  const std::string& name = session.artifact().states()[static_cast<std::size_t>(session.exit()->state)].name;
+  report["left_domain"] = {{"signal", name}, {"time_s", session.exit()->time_s}};
+  return name + " left its domain at " + format_number(session.exit()->time_s) + " s";
+}
+
+int run_system(const CLI::App& app, const Options& options) {
+  const CommonOptions& common = options.common;
+  if (app.count("--brake-time-constant-s") > 0) {
+    throw InputError("command line", "brake-time-constant-s", "a value", "nothing beside the artifact of a system");
+  }
+  const SystemArtifact artifact = SystemArtifact::load(common.artifact);
+  const SystemScenario scenario = SystemScenario::load(options.scenario, artifact);
+  install_stop_signals();
+  const std::unique_ptr<OutputFile> file = open_record(common, "qlpv-simulator", options.scenario);
+  SystemSession session(artifact, scenario);
+  const bool realtime = apply_priority(app, common);
+  return run_session(session, options, identity_of(common, artifact), file.get(), realtime,
+                     [&session](Json& report) { return explain_exit(session, report); });
+}
+
+int run(const CLI::App& app, Options& options) {
+  options.run.pace = options.common.pace;
+  options.run.timeout_s = options.common.timeout_s;
+  return SystemArtifact::is_in(options.common.artifact) ? run_system(app, options) : run_robot(app, options);
 }
 
 }  // namespace

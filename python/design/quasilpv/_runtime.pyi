@@ -1,6 +1,6 @@
 """The C++ runtime library. All arrays are of double; joint arrays have shape (joints,), SI units."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -276,12 +276,12 @@ class SystemController:
     def reset(self) -> None: ...
     def step(self, state: npt.ArrayLike, parameter: npt.ArrayLike) -> dict[str, Any]: ...
 
-def simulate_system(
-    artifact: SystemArtifact,
-    start: Sequence[float],
-    parameter: Sequence[float],
-    samples: int,
-    rk4_steps: int,
-    tolerance: float,
-    delay_s: float,
-) -> dict[str, Any]: ...
+class SystemScenario:
+    @property
+    def name(self) -> str: ...
+    @property
+    def samples(self) -> int: ...
+    @staticmethod
+    def parse(data: bytes, source: str, artifact: SystemArtifact) -> SystemScenario: ...
+
+def simulate_system(artifact: SystemArtifact, scenario: SystemScenario) -> dict[str, Any]: ...

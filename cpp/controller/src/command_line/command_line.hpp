@@ -22,6 +22,7 @@
 #include "quasilpv/pacer.hpp"
 #include "quasilpv/process_setup.hpp"
 #include "quasilpv/realtime.hpp"
+#include "quasilpv/system_artifact.hpp"
 
 namespace quasilpv {
 
@@ -96,6 +97,13 @@ inline void declare(CLI::App& app, CommonOptions& options) {
 inline WireIdentity identity_of(const CommonOptions& options, const Artifact& artifact) {
   return {options.session, artifact.hash_prefix(), artifact.joints(), options.pace,
           to_nanoseconds(artifact.sample_period_s())};
+}
+
+/// The same of a general system.
+inline WireIdentity identity_of(const CommonOptions& options, const SystemArtifact& artifact) {
+  const SignalCounts counts{static_cast<int>(artifact.states().size()), static_cast<int>(artifact.parameters().size()),
+                            static_cast<int>(artifact.inputs().size()), artifact.gain().premises()};
+  return {options.session, artifact.hash_prefix(), 0, options.pace, to_nanoseconds(artifact.sample_period_s()), counts};
 }
 
 /// Puts the link into authenticated mode if `--key` asks for it. INIT-ONLY. Throws InputError like MessageKey::load().

@@ -23,6 +23,24 @@ void flatten(const Json& value, const std::string& path, Rows& rows) {
   }
 }
 
+/// What the samples before a fault have in common, and what `add` says of each.
+template <class Sample, class Add>
+Json columns_of(const LastSamples<Sample>& post_mortem, FaultCause cause, Add add) {
+  if (post_mortem.size() == 0 || cause == FaultCause::kStopRequested) {
+    return nullptr;
+  }
+  Json report = {{"cause", to_string(cause)}};
+  for (std::size_t i = 0; i < post_mortem.size(); ++i) {
+    const Sample& sample = post_mortem[i];
+    report["seq"].push_back(sample.seq);
+    report["state"].push_back(static_cast<int>(sample.state));
+    report["flags"].push_back(sample.flags);
+    report["step_ns"].push_back(sample.step_ns);
+    add(sample, report);
+  }
+  return report;
+}
+
 }  // namespace
 
 Json to_json(const LatencyHistogram& histogram) {
@@ -56,9 +74,6 @@ Json to_json(const LinkCounters& counters) {
 }
 
 Json to_json(const PostMortem& post_mortem, FaultCause cause, int joints) {
-  if (post_mortem.size() == 0 || cause == FaultCause::kStopRequested) {
-    return nullptr;
-  }
   using Values = JointArray TelemetrySample::*;
   static const std::pair<const char*, Values> kColumns[] = {
       {"reference_angle_rad", &TelemetrySample::reference_angle_rad},
@@ -67,18 +82,24 @@ Json to_json(const PostMortem& post_mortem, FaultCause cause, int joints) {
       {"estimated_speed_rad_s", &TelemetrySample::estimated_speed_rad_s},
       {"torque_commanded_nm", &TelemetrySample::commanded_torque_nm},
       {"torque_applied_nm", &TelemetrySample::applied_torque_nm}};
-  Json report = {{"cause", to_string(cause)}};
-  for (std::size_t i = 0; i < post_mortem.size(); ++i) {
-    const TelemetrySample& sample = post_mortem[i];
-    report["seq"].push_back(sample.seq);
-    report["state"].push_back(static_cast<int>(sample.state));
-    report["flags"].push_back(sample.flags);
-    report["step_ns"].push_back(sample.step_ns);
+  return columns_of(post_mortem, cause, [joints](const TelemetrySample& sample, Json& report) {
     for (const auto& [name, values] : kColumns) {
       report[name].push_back(std::vector<double>((sample.*values).begin(), (sample.*values).begin() + joints));
     }
-  }
-  return report;
+  });
+}
+
+Json to_json(const LastSamples<SystemSample>& post_mortem, FaultCause cause, const SystemArtifact& artifact) {
+  return columns_of(post_mortem, cause, [&artifact](const SystemSample& sample, Json& report) {
+    for (std::size_t k = 0; k < artifact.states().size(); ++k) {
+      report["measured"][artifact.states()[k].name].push_back(sample.measured[k]);
+    }
+    for (std::size_t k = 0; k < artifact.inputs().size(); ++k) {
+      report["commanded"][artifact.inputs()[k].name].push_back(sample.commanded[k]);
+      report["applied"][artifact.inputs()[k].name].push_back(sample.applied[k]);
+    }
+    report["level"].push_back(sample.level);
+  });
 }
 
 void print_report(std::ostream& out, const Json& report, bool as_json) {

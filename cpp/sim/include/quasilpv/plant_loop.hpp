@@ -13,6 +13,7 @@
 #include "quasilpv/plant_session.hpp"
 #include "quasilpv/record.hpp"
 #include "quasilpv/scenario.hpp"
+#include "quasilpv/system_session.hpp"
 
 namespace quasilpv {
 
@@ -84,6 +85,15 @@ JointArray viscous_brake(const Scenario& scenario, double time_constant_s);
 ///                and `command_delay_s` (-1: no command in this sample); may be null
 /// @param stop    set by a signal handler or another thread
 PlantRunReport run_plant(PlantSession& session, Link& link, const PlantRunSettings& settings, Record* record,
+                         const std::atomic<bool>& stop);
+
+/// The same of a general system. A command that is not finite or beyond the limits of an input is refused; the watchdog
+/// applies the trim input, or the limit next to it. A system that leaves its domain says so (EventCode::kLeftDomain)
+/// and ends the run.
+///
+/// @param record  gets `seq`, `time_s`, `state.NAME` of every state (the truth), `input.NAME` of every input and
+///                `command_delay_s`; may be null
+PlantRunReport run_plant(SystemSession& session, Link& link, const PlantRunSettings& settings, Record* record,
                          const std::atomic<bool>& stop);
 
 }  // namespace quasilpv

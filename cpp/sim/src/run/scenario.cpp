@@ -8,17 +8,16 @@
 
 #include "document/document.hpp"
 #include "plants/registry.hpp"
+#include "run/integrator_field.hpp"
 
 namespace quasilpv {
 namespace {
 
 constexpr int kMaxEncoderBits = 32;
 constexpr std::int64_t kMaxSeed = 9007199254740991;  // 2^53 - 1, the largest integer every JSON reader keeps
-constexpr int kMaxStepsPerSample = 1000000;
 constexpr std::size_t kMaxSines = 1000;
 constexpr double kLargestNumber = 1e16;
 constexpr double kMaxDurationS = 86400.0;
-constexpr double kMaxTolerance = 0.1;
 constexpr double kMaxDelayS = 10.0;
 
 void require_bounded(const Field& field) {
@@ -36,38 +35,11 @@ void require_bounded(const Field& field) {
   }
 }
 
-double at_most(double limit, const Field& field, double value) {
-  if (value > limit) {
-    field.fail(field.json().dump(), "at most " + Json(limit).dump());
-  }
-  return value;
-}
-
 JointArray joint_array(const Field& field, int joints) {
   const std::vector<double> values = field.numbers(static_cast<std::size_t>(joints));
   JointArray array{};
   std::copy(values.begin(), values.end(), array.begin());
   return array;
-}
-
-IntegratorOptions integrator(const Field& field) {
-  const std::string kind = field["kind"].text();
-  if (kind == "ida") {
-    field.only({"kind", "relative_tolerance", "absolute_tolerance"});
-    const Field relative = field["relative_tolerance"];
-    const Field absolute = field["absolute_tolerance"];
-    return IdaOptions{at_most(kMaxTolerance, relative, relative.positive()),
-                      at_most(kMaxTolerance, absolute, absolute.positive())};
-  }
-  if (kind == "rk4") {
-    field.only({"kind", "steps_per_sample"});
-    return Rk4Options{static_cast<int>(field["steps_per_sample"].integer(1, kMaxStepsPerSample))};
-  }
-  if (kind == "mujoco") {
-    field.only({"kind", "steps_per_sample"});
-    return MujocoOptions{static_cast<int>(field["steps_per_sample"].integer(1, kMaxStepsPerSample))};
-  }
-  field["kind"].fail_choice({"ida", "rk4", "mujoco"});
 }
 
 std::vector<SineTorque> external_torque(const Field& field, int joints) {
@@ -131,7 +103,7 @@ Scenario Scenario::parse(std::string_view bytes, const std::string& source) {
   scenario.duration_s = at_most(kMaxDurationS, root["duration_s"], root["duration_s"].positive());
   scenario.plant = read_plant(root["plant"]);
   const int n = scenario.joints();
-  scenario.integrator = quasilpv::integrator(root["integrator"]);
+  scenario.integrator = read_integrator(root["integrator"]);
   scenario.external_torque = quasilpv::external_torque(root["external_torque"], n);
   scenario.sensors = quasilpv::sensors(root["sensors"]);
   scenario.transport_delay_s = at_most(kMaxDelayS, root["transport_delay_s"], root["transport_delay_s"].non_negative());

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,11 +13,23 @@ from quasilpv.cli.options import (
     ArtifactOption,
     EncoderOption,
     LogOption,
-    PlantOption,
     RateOption,
     plant_kind,
     require_controller,
     sensors_of,
+)
+from quasilpv.cli.pacing import Pacing, counters_of, print_latencies
+from quasilpv.cli.system_hil import run_system
+from quasilpv.cli.system_options import (
+    DelayOption,
+    DurationOption,
+    NoiseOption,
+    ParameterOption,
+    QuantisationOption,
+    Rk4Option,
+    SeedOption,
+    StartOption,
+    SystemOptions,
 )
 from quasilpv.defaults import ENCODER_BITS, WATCHDOG_S
 from quasilpv.errors import FaultStop, InputError
@@ -24,33 +37,55 @@ from quasilpv.synthesis import DEFAULT_CONTROLLER
 
 if TYPE_CHECKING:
     from quasilpv.cli.session import Session
-    from quasilpv.experiments.hil import HilResult, RealTimeOptions
+    from quasilpv.experiments.hil import HilResult
+    from quasilpv.experiments.processes import Talk
     from quasilpv.experiments.result import TrackResult, Variant
     from quasilpv.scenarios import TrackingExperiment
 
-LATENCIES = ("wakeup_ns", "round_trip_ns")
-COUNTERS = ("missed_commands", "late_commands", "watchdog_samples", "overruns", "skipped_ticks")
-QUANTILES = ("p50", "p99", "p99_9", "max")
+ARTIFACT_SUFFIXES = (".json", ".cbor")
+WATCHDOG_DEFAULT = f"[default: {WATCHDOG_S:g}; of systems at least three samples]"
 
 
 def hil_command(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario id, see design list.")],
+    scenario: Annotated[
+        str, typer.Argument(metavar="SCENARIO", help="Scenario id, see design list, or ARTIFACT of a system.")
+    ],
     *,
     real_time: Annotated[bool, typer.Option("--real-time", help="Paced by the clock instead of lock-step.")] = False,
     silence_s: Annotated[
-        float, typer.Option("--silence-s", min=1e-3, help="Real time: fault after so long without a measurement.")
-    ] = WATCHDOG_S,
+        float | None,
+        typer.Option(
+            "--silence-s", min=1e-3, help=f"Real time: fault after so long without a measurement.  {WATCHDOG_DEFAULT}"
+        ),
+    ] = None,
     hold_s: Annotated[
-        float, typer.Option("--hold-s", min=1e-3, help="Real time: the plant brakes after so long without a command.")
-    ] = WATCHDOG_S,
+        float | None,
+        typer.Option(
+            "--hold-s",
+            min=1e-3,
+            help=f"Real time: the plant brakes after so long without a command.  {WATCHDOG_DEFAULT}",
+        ),
+    ] = None,
     priority: Annotated[
         int | None, typer.Option("--priority", min=1, max=99, help="Real time: lock memory, use SCHED_FIFO.")
     ] = None,
-    controller: Annotated[str, typer.Option("--controller", metavar="ID")] = DEFAULT_CONTROLLER,
+    controller: Annotated[
+        str | None, typer.Option("--controller", metavar="ID", help=f"[default: {DEFAULT_CONTROLLER}]")
+    ] = None,
     artifact: ArtifactOption = None,
     rate_hz: RateOption = None,
     encoder_bits: EncoderOption = None,
-    plant: PlantOption = "perturbed",
+    plant: Annotated[
+        str | None, typer.Option("--plant", metavar="PLANT", help="nominal or perturbed.  [default: perturbed]")
+    ] = None,
+    start: StartOption = None,
+    parameter: ParameterOption = None,
+    duration_s: DurationOption = None,
+    delay_s: DelayOption = None,
+    rk4_steps: Rk4Option = None,
+    noise: NoiseOption = None,
+    quantisation: QuantisationOption = None,
+    seed: SeedOption = None,
     url: Annotated[
         str | None,
         typer.Option("--url", help="LCM URL of both, so that others can listen.  [default: a port of its own]"),
@@ -64,45 +99,84 @@ def hil_command(
     ] = Path("out/hil"),
     log: LogOption = True,
     json: JsonOption = False,
-) -> None:
-    """Run a scenario with controller and plant as two processes over LCM, and once more in this process.
+) -> int:
+    """Run a scenario, or a system, with controller and plant as two processes over LCM, and once more in this process.
 
     In lock-step both runs must be identical, bit for bit (exit code 1 if they are not). With --real-time the rms of
     both is printed with the measured wake-up and round-trip latencies beside it. A run that a fault stopped is printed
     all the same, and ends with exit code 3.
 
     \b
-    Example:
+    Examples:
       design hil serial-square --real-time
+      design hil out/cart_pole/artifact.json --start th=0.2 --noise th=0.001
     """
+    if priority is not None and not real_time:
+        raise InputError("command line", "--priority", priority, "nothing without --real-time: lock-step has no clock")
+    own = SystemOptions(start, parameter, duration_s, delay_s, rk4_steps, noise, quantisation, seed)
+    pace = Pacing(real_time, silence_s, hold_s, priority, url, key)
+    if scenario.endswith(ARTIFACT_SUFFIXES):
+        robots = {
+            "--controller": controller,
+            "--artifact": artifact,
+            "--rate-hz": rate_hz,
+            "--encoder-bits": encoder_bits,
+            "--plant": plant,
+        }
+        _refuse(
+            [name for name, value in robots.items() if value is not None], "nothing beside the artifact of a system"
+        )
+        return run_system(Path(scenario), own, pace, out=out, log=log, json=json)
+    _refuse(own.given(), "nothing beside a scenario of a robot")
+    _run_robot(
+        scenario,
+        Asked(controller or DEFAULT_CONTROLLER, artifact, rate_hz, encoder_bits, plant or "perturbed"),
+        pace,
+        out=out,
+        log=log,
+        json=json,
+    )
+    return 0
+
+
+def _refuse(options: list[str], expected: str) -> None:
+    for name in options:
+        raise InputError("command line", name, "a value", expected)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Which controller a robot gets, and which plant."""
+
+    controller: str
+    artifact: Path | None
+    rate_hz: float | None
+    encoder_bits: int | None
+    plant: str
+
+
+def _run_robot(scenario: str, asked: Asked, pace: Pacing, *, out: Path, log: bool, json: bool) -> None:
+    """The verb for robots."""
     from quasilpv.artifact import read_artifact
     from quasilpv.cli.results import print_warnings
     from quasilpv.cli.session import Session
-    from quasilpv.experiments.hil import RealTimeOptions, require_identical
+    from quasilpv.experiments.hil import require_identical
     from quasilpv.experiments.result import Variant
     from quasilpv.experiments.setup import variant_of
     from quasilpv.scenarios import tracking_experiment
 
-    if priority is not None and not real_time:
-        raise InputError("command line", "--priority", priority, "nothing without --real-time: lock-step has no clock")
-    given = None if artifact is None else read_artifact(artifact)
-    variant = Variant(require_controller(controller), ENCODER_BITS if encoder_bits is None else encoder_bits)
+    given = None if asked.artifact is None else read_artifact(asked.artifact)
+    bits = ENCODER_BITS if asked.encoder_bits is None else asked.encoder_bits
+    variant = Variant(require_controller(asked.controller), bits)
     if given is not None:
         variant = variant_of(given, sensors_of(variant.encoder_bits))
-    if plant == "mujoco":
+    if asked.plant == "mujoco":
         expected = "nominal or perturbed: qlpv-simulator has no MuJoCo, design track has"
-        raise InputError("command line", "--plant", plant, expected)
+        raise InputError("command line", "--plant", asked.plant, expected)
     experiment = tracking_experiment(scenario)
-    session = Session(given, rate_hz, plant_kind(plant, [experiment]), out, log)
-    over_lcm, in_process = _run_both(
-        session,
-        experiment,
-        variant,
-        RealTimeOptions(silence_s, hold_s, priority) if real_time else None,
-        url=url,
-        key=key,
-    )
-    if not real_time and over_lcm.fault is None:
+    session = Session(given, asked.rate_hz, plant_kind(asked.plant, [experiment]), out, log)
+    over_lcm, in_process = _run_both(session, experiment, variant, pace.talk(0.0))
+    if not pace.real_time and over_lcm.fault is None:
         require_identical(over_lcm.result.run, in_process.run)
     if json:
         print_json(_row(over_lcm, in_process))
@@ -115,15 +189,9 @@ def hil_command(
 
 
 def _run_both(
-    session: Session,
-    experiment: TrackingExperiment,
-    variant: Variant,
-    real_time: RealTimeOptions | None,
-    *,
-    url: str | None,
-    key: Path | None,
+    session: Session, experiment: TrackingExperiment, variant: Variant, talk: Talk
 ) -> tuple[HilResult, TrackResult]:
-    """The run over LCM, in lock-step without options of real time, and the same in this process."""
+    """The run over LCM, and the same in this process."""
     from quasilpv.experiments.hil import run_over_lcm
     from quasilpv.experiments.setup import RunSetup
 
@@ -142,10 +210,7 @@ def _run_both(
                 log=session.log,
             ),
             session.folder(experiment, variant),
-            mode="lockstep" if real_time is None else "realtime",
-            real_time=real_time,
-            url=url,
-            key=key,
+            talk,
         )
         steps.end()
     return over_lcm, in_process
@@ -171,12 +236,7 @@ def _print(over_lcm: HilResult, in_process: TrackResult) -> None:
     columns, cells = layout(in_process)
     rows = [cells(in_process, "in process"), cells(over_lcm.result, f"over LCM, {over_lcm.mode}")]
     print_table(title, ("", *columns[1:]), rows)
-    latencies = {name: over_lcm.simulator[name] for name in LATENCIES if over_lcm.simulator[name] is not None}
-    waits = [
-        (name.removesuffix("_ns").replace("_", " "), *(f"{latency[q] / 1e3:.1f}" for q in QUANTILES))
-        for name, latency in latencies.items()
-    ]
-    print_table("latency at the plant, us", ("", *QUANTILES), waits)
+    print_latencies(over_lcm.simulator)
     if over_lcm.fault is not None:
         post_mortem = over_lcm.controller["post_mortem"]
         seq = post_mortem["seq"] if post_mortem else []
@@ -184,4 +244,4 @@ def _print(over_lcm: HilResult, in_process: TrackResult) -> None:
     elif over_lcm.mode == "lockstep":
         print(f"{over_lcm.result.run.time_s.size} samples, identical to the run in process")
     else:
-        print(", ".join(f"{name.replace('_', ' ')}: {over_lcm.simulator[name]}" for name in COUNTERS))
+        print(counters_of(over_lcm.simulator))

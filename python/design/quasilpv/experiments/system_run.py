@@ -1,18 +1,20 @@
-"""One closed-loop run of a general system against its own equations, in one process."""
+"""One closed-loop run of a general system against its own equations, and the same in one process."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from quasilpv import _runtime
 from quasilpv.arrays import FloatArray
-from quasilpv.documents.canonical import canonical_json
-from quasilpv.documents.system_artifact import Signal, SystemArtifactDocument
-from quasilpv.errors import InputError, one_of
+from quasilpv.documents.canonical import MAX_SAFE_INTEGER, canonical_json
+from quasilpv.documents.system_artifact import SystemArtifactDocument
+from quasilpv.errors import InputError
+from quasilpv.scenarios import NOISE_SEED, IdaIntegrator, Rk4Integrator, SystemScenario
+from quasilpv.scenarios.system_schema import MOST_SAMPLES, SystemSensors, values_by_name
 
 FLAGS = {
     1: "signal invalid",
@@ -23,8 +25,6 @@ FLAGS = {
 }
 SETTLING_TIMES = 6.0
 """Length of a run if none is stated, in units of 1 / decay rate."""
-
-MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,9 @@ class SystemExperiment:
         delay_s: until an input acts, at most one sample.
         rk4_steps: of the Runge-Kutta method per sample; 0 for IDA.
         tolerance: relative, of IDA.
+        noise: standard deviations of white noise on what is measured of states, by name.
+        quantisation: steps to which what is measured of states is rounded, by name.
+        seed: of the noise.
     """
 
     start: Mapping[str, float]
@@ -46,6 +49,9 @@ class SystemExperiment:
     delay_s: float = 0.0
     rk4_steps: int = 0
     tolerance: float = 1e-8
+    noise: Mapping[str, float] = field(default_factory=dict)
+    quantisation: Mapping[str, float] = field(default_factory=dict)
+    seed: int = NOISE_SEED
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,25 +60,46 @@ class SystemRun:
 
     Attributes:
         artifact: the controller.
+        scenario: what was run.
         time_s: of the samples, (N,).
-        state, input: (N, n) and (N, m), with their trim.
-        level: V, (N,): at most 1 in the region.
+        state, measured: (N, n), the truth and what the controller was told of it, with their trim.
+        input: (N, m), with its trim.
+        level: V of the truth, (N,): at most 1 in the region.
+        measured_level: V as the controller saw it, (N,).
         flags: of all samples, in words.
         exit: when a state left its domain, and which; None if none did.
     """
 
     artifact: SystemArtifactDocument
+    scenario: SystemScenario
     time_s: FloatArray
     state: FloatArray
+    measured: FloatArray
     input: FloatArray
     level: FloatArray
+    measured_level: FloatArray
     flags: tuple[str, ...]
     exit: tuple[float, str] | None
 
     @property
     def stayed(self) -> bool:
-        """Whether V never exceeded its start, and no state left its domain."""
-        return self.exit is None and bool(self.level.max() <= max(self.level[0], 1e-300) * (1.0 + 1e-9))
+        """Whether no state left its domain, and V never exceeded its start or, with sensors that are not exact, 1."""
+        bound = self.level[0] if self.scenario.has_exact_sensors else max(self.level[0], 1.0)
+        return self.exit is None and bool(self.level.max() <= max(bound, 1e-300) * (1.0 + 1e-9))
+
+    def first_difference(self, other: SystemRun) -> str | None:
+        """In words, the first sample in which two runs differ in any bit; None if there is none."""
+        if len(self.time_s) != len(other.time_s):
+            return f"{len(self.time_s)} samples and {len(other.time_s)}"
+        for name in ("time_s", "state", "measured", "input", "measured_level"):
+            mine, theirs = (np.ascontiguousarray(getattr(run, name), dtype=np.float64) for run in (self, other))
+            different = np.flatnonzero(
+                (mine.view(np.int64) != theirs.view(np.int64)).reshape(len(mine), -1).any(axis=1)
+            )
+            if different.size:
+                k = int(different[0])
+                return f"{name} of sample {k}: {mine[k].tolist()!r} and {theirs[k].tolist()!r}"
+        return None
 
     def to_document(self) -> dict[str, Any]:
         """What ``design simulate --json`` prints."""
@@ -90,27 +117,51 @@ class SystemRun:
                 signal.name: float(np.abs(self.input[:, k] - signal.trim).max())
                 for k, signal in enumerate(self.artifact.inputs)
             },
+            "exact_sensors": self.scenario.has_exact_sensors,
             "flags": list(self.flags),
             "left_domain": None if self.exit is None else {"time_s": self.exit[0], "signal": self.exit[1]},
         }
 
 
-def simulate(artifact: SystemArtifactDocument, experiment: SystemExperiment, source: str = "artifact") -> SystemRun:
-    """Run it.
+def scenario_of(artifact: SystemArtifactDocument, experiment: SystemExperiment, source: str) -> SystemScenario:
+    """The document of an experiment with a controller.
 
     Raises:
         InputError: a name is unknown, or a number is out of range.
-        PlantError: the equations could not be integrated.
     """
-    start = _values(artifact.states, experiment.start, source, "start", [s.trim for s in artifact.states])
+    states = artifact.states
+    nothing = [0.0] * len(states)
     middle = [
         0.5 * (signal.low + signal.high) + signal.trim
         for signal in artifact.parameters
         if signal.low is not None and signal.high is not None
     ]
-    parameters = _values(artifact.parameters, experiment.parameters, source, "parameter", middle)
-    period = artifact.sample_period_s
-    duration = experiment.duration_s
+    start = values_by_name(states, experiment.start, [signal.trim for signal in states], source, "start")
+    parameters = values_by_name(artifact.parameters, experiment.parameters, middle, source, "parameter")
+    noise = values_by_name(states, experiment.noise, nothing, source, "noise")
+    quantum = values_by_name(states, experiment.quantisation, nothing, source, "quantisation")
+    for name, sizes in (("noise", noise), ("quantisation", quantum)):
+        for signal, size in sizes.items():
+            if not 0.0 <= size < np.inf:
+                raise InputError(source, f"{name} {signal}", f"{size:g}", "a number that is not negative")
+    if not 0 <= experiment.seed <= MAX_SAFE_INTEGER:
+        raise InputError(source, "seed", experiment.seed, f"0 to {MAX_SAFE_INTEGER}")
+    tolerance = experiment.tolerance
+    return SystemScenario(
+        name=artifact.name,
+        samples=_samples(artifact, experiment, source),
+        start=start,
+        parameters=parameters,
+        integrator=Rk4Integrator(steps_per_sample=experiment.rk4_steps)
+        if experiment.rk4_steps
+        else IdaIntegrator(relative_tolerance=tolerance, absolute_tolerance=0.01 * tolerance),
+        delay_s=experiment.delay_s,
+        sensors=SystemSensors(noise=noise, quantum=quantum, seed=experiment.seed),
+    )
+
+
+def _samples(artifact: SystemArtifactDocument, experiment: SystemExperiment, source: str) -> int:
+    period, duration = artifact.sample_period_s, experiment.duration_s
     if duration is None:
         duration = SETTLING_TIMES / max(artifact.region.decay_rate_per_s, 1e-9)
     samples = round(duration / period)
@@ -123,28 +174,46 @@ def simulate(artifact: SystemArtifactDocument, experiment: SystemExperiment, sou
         )
     if not 0.0 <= experiment.delay_s <= period:
         raise InputError(source, "delay", f"{experiment.delay_s:g} s", f"0 to one sample, {period:g} s")
+    return samples
+
+
+def simulate(artifact: SystemArtifactDocument, experiment: SystemExperiment, source: str = "artifact") -> SystemRun:
+    """Run it.
+
+    Raises:
+        InputError: a name is unknown, or a number is out of range.
+        PlantError: the equations could not be integrated.
+    """
+    return simulate_scenario(artifact, scenario_of(artifact, experiment, source), source)
+
+
+def simulate_scenario(artifact: SystemArtifactDocument, scenario: SystemScenario, source: str) -> SystemRun:
+    """Run a document. Errors as `simulate`."""
     runtime = _runtime.SystemArtifact.parse(canonical_json(artifact.to_document()), source)
-    found = _runtime.simulate_system(
-        runtime, start, parameters, samples, experiment.rk4_steps, experiment.tolerance, experiment.delay_s
-    )
+    wanted = _runtime.SystemScenario.parse(canonical_json(scenario.to_document()), source, runtime)
+    found = _runtime.simulate_system(runtime, wanted)
     columns = found["columns"]
     return SystemRun(
         artifact=artifact,
+        scenario=scenario,
         time_s=columns["time_s"][:, 0],
         state=columns["state"],
+        measured=columns["measured"],
         input=columns["input"],
-        level=columns["level"][:, 0],
-        flags=tuple(text for bit, text in FLAGS.items() if found["flags"] & bit),
+        level=level_of(artifact, columns["state"]),
+        measured_level=columns["level"][:, 0],
+        flags=flags_in_words(found["flags"]),
         exit=found["exit"],
     )
 
 
-def _values(
-    signals: tuple[Signal, ...], given: Mapping[str, float], source: str, field: str, otherwise: list[float]
-) -> list[float]:
-    """In order; those not named as they are otherwise."""
-    names = [signal.name for signal in signals]
-    for name in given:
-        if name not in names:
-            raise InputError(source, field, name, one_of(names, name) if names else "nothing: it has none")
-    return [float(given.get(name, value)) for name, value in zip(names, otherwise, strict=True)]
+def flags_in_words(flags: int) -> tuple[str, ...]:
+    """What happened in a run, from the union of the flags of its samples."""
+    return tuple(text for bit, text in FLAGS.items() if flags & bit)
+
+
+def level_of(artifact: SystemArtifactDocument, state: FloatArray) -> FloatArray:
+    """V = x_d' P^-1 x_d of states (N, n) with their trim: (N,)."""
+    q = artifact.model.differential
+    x = state[:, :q] - np.array([signal.trim for signal in artifact.states[:q]])
+    return np.asarray(np.einsum("ki,ik->k", x, np.linalg.solve(np.array(artifact.region.lyapunov), x.T)))

@@ -1,9 +1,8 @@
 """Scenarios: an experiment the simulator can run, true plant included (``docs/reference/formats.md``).
 
-Four parts: the documents (`schema`), what is tracked by which robot (`experiment`), the experiments known by name
-(`registry`), and the way from a robot and a reference
-to a document (`builder`). Encoders have 20 bits; the measured speed, which only the baseline laws read, carries white
-noise.
+Five parts: the documents (`schema`; `system_schema` of general systems), what is tracked by which robot (`experiment`),
+the experiments known by name (`registry`), and the way from a robot and a reference to a document (`builder`). Encoders
+have 20 bits; the measured speed, which only the baseline laws read, carries white noise.
 """
 
 from quasilpv.scenarios.builder import build_scenario
@@ -25,6 +24,7 @@ from quasilpv.scenarios.schema import (
     sine_torques,
     write_scenario,
 )
+from quasilpv.scenarios.system_schema import SystemScenario, write_system_scenario
 
 __all__ = [
     "EXTERNAL_TORQUE",
@@ -39,6 +39,7 @@ __all__ = [
     "Scenario",
     "Sensors",
     "SineTorque",
+    "SystemScenario",
     "TrackingExperiment",
     "build_scenario",
     "motions_of",
@@ -47,4 +48,5 @@ __all__ = [
     "tracking_experiment",
     "tracking_experiments",
     "write_scenario",
+    "write_system_scenario",
 ]
