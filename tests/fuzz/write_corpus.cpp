@@ -17,16 +17,22 @@ void write(const std::filesystem::path& path, const std::string& bytes) {
 }
 
 template <class Message>
+void fill(Message& message) {
+  message.joints = 3;
+}
+void fill(event_v2& message) {
+  message.source = static_cast<std::int32_t>(Side::kController);
+  message.code = static_cast<std::int32_t>(EventCode::kStarted);
+}
+void fill(signals_measurement_v1& message) { message.signals = 6; }
+void fill(signals_command_v1& message) { message.inputs = 3; }
+
+template <class Message>
 std::string message_seed(char channel) {
   Message message{};
   message.session = 42;
   message.artifact_hash = -7;
-  if constexpr (!std::is_same_v<Message, event_v2>) {
-    message.joints = 3;
-  } else {
-    message.source = static_cast<std::int32_t>(Side::kController);
-    message.code = static_cast<std::int32_t>(EventCode::kStarted);
-  }
+  fill(message);
   Packet packet;
   encode(message, packet);
   return channel + std::string(packet.bytes.begin(), packet.bytes.begin() + packet.size);
@@ -52,4 +58,6 @@ int main(int argc, char** argv) {
   write(folder / "message" / "measurement", message_seed<measurement_v3>(0));
   write(folder / "message" / "command", message_seed<command_v2>(1));
   write(folder / "message" / "event", message_seed<event_v2>(2));
+  write(folder / "message" / "signals_measurement", message_seed<signals_measurement_v1>(3));
+  write(folder / "message" / "signals_command", message_seed<signals_command_v1>(4));
 }

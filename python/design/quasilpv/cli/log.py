@@ -42,13 +42,13 @@ def log_command(
     figure_formats: FormatOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Look into the log that every run of design track and design hil writes.
+    """Look into the log that every run of design track, hil and simulate -o writes.
 
     \b
     info     channels, counts, rates, what is missing, the artifact's hash
-    plot     the figures of the run, as design track draws them
+    plot     the figures of the run, as design track or simulate draws them
     replay   the controller again, in lock-step, on the logged measurements; exit
-             code 1 unless it commands the logged torques, bit for bit
+             code 1 unless it commands the logged torques or inputs, bit for bit
     to-mcap  a file that Foxglove and PlotJuggler open
 
     \b
@@ -73,33 +73,42 @@ def _info(log: RunLog, _: Path | None, json: bool) -> None:
     if json:
         print_json({**about, "channels": channels, "events": _events(log), "foreign": dict(log.foreign)})
         return
-    print_table(log.source, ("", ""), [(name, str(value)) for name, value in about.items() if value is not None], 2)
+    print_table(log.source, ("", ""), [(name, _text(value)) for name, value in about.items() if value is not None], 2)
     columns = ("channel", "messages", "rate\nHz", "samples", "missing", "repeated", "refused")
     rows = [(name, *(_cell(entry[key.split("\n")[0]]) for key in columns[1:])) for name, entry in channels.items()]
     print_table("channels", columns, rows)
     print_table("events", ("sample", "event"), [(str(event["seq"]), event["event"]) for event in _events(log)])
 
 
+def _text(value: Any) -> str:
+    return ", ".join(f"{name} ({what})" for name, what in value.items()) if isinstance(value, dict) else str(value)
+
+
 def _about(log: RunLog) -> dict[str, Any]:
     import numpy as np
 
-    from quasilpv.telemetry.codes import AT_LIMIT
+    from quasilpv.telemetry.codes import AT_LIMIT, INPUT_AT_LIMIT
     from quasilpv.telemetry.log import ARTIFACT, HEADER
 
     telemetry, about = log["telemetry"], {"log": log.source, "duration_s": round(log.duration_s, 6)}
-    if HEADER in log.documents:
+    if HEADER in log.documents and log.is_of_system:
+        about |= {"mode": log.header.mode, "scenario": log.system_scenario.name, "controller": log.header.controller}
+        about |= {"signals": _signals(log)}
+    elif HEADER in log.documents:
         scenario = log.scenario
         about |= {"mode": log.header.mode, "scenario": scenario.name, "plant": scenario.plant.label}
         about |= {"controller": log.header.controller, "trajectory_hash": log.trajectory.hash}
     if ARTIFACT in log.documents:
-        about |= {"artifact": log.artifact.name, "artifact_hash": log.artifact.hash}
+        about |= {"artifact": log.any_artifact.name, "artifact_hash": log.any_artifact.hash}
     sessions = {session for messages in log.channels.values() for session in messages.records["session"].tolist()}
     about["sessions"] = sorted(sessions)
     about["incomplete_bytes"] = log.incomplete_bytes
     about["telemetry_drops"] = int(telemetry.records["drops"].max(initial=0))
     if telemetry.samples.size:
-        about["share_at_limit"] = float(np.mean((telemetry.samples["flags"] & AT_LIMIT) != 0))
-        about["largest_premise_excess"] = float(np.max(telemetry.samples["premise_excess"]))
+        limit = INPUT_AT_LIMIT if log.is_of_system else AT_LIMIT
+        about["share_at_limit"] = float(np.mean((telemetry.samples["flags"] & limit) != 0))
+        largest = "level" if log.is_of_system else "premise_excess"
+        about[f"largest_{largest}"] = float(np.max(telemetry.samples[largest]))
     return about
 
 
@@ -119,13 +128,22 @@ def _channels(log: RunLog) -> dict[str, dict[str, Any]]:
 def _events(log: RunLog) -> list[dict[str, Any]]:
     """Who said what at which sample, in the order of the log."""
     from quasilpv.telemetry.codes import event_in_words
+    from quasilpv.telemetry.log import ARTIFACT
 
-    return [{"seq": int(record["seq"]), "event": event_in_words(record)} for record in log["event"].records]
+    known = log.is_of_system and ARTIFACT in log.documents
+    states = [signal.name for signal in log.system_artifact.states] if known else []
+    return [{"seq": int(record["seq"]), "event": event_in_words(record, states)} for record in log["event"].records]
+
+
+def _signals(log: RunLog) -> dict[str, str]:
+    """The roles and the units of the signals, by name."""
+    roles = {signal.name: (signal.role, signal.unit) for signal in log.system_artifact.signals}
+    return {name: role if unit in ("", "1") else f"{role}, {unit}" for name, (role, unit) in roles.items()}
 
 
 def _samples(name: str, messages: Messages, last_seq: int) -> dict[str, int | None]:
     """How the messages cover the samples; nothing of events, and of a truth that is not known."""
-    if name == "QLPV_EVENT" or (name == "QLPV_TRUTH" and not messages.records.size):
+    if name == "QLPV_EVENT" or (name.endswith("_TRUTH") and not messages.records.size):
         return {"samples": None, "missing": None, "repeated": None}
     return {"samples": int(messages.samples.size), "missing": messages.missing(last_seq), "repeated": messages.repeated}
 
@@ -135,16 +153,25 @@ def _cell(value: float | None) -> str:
 
 
 def _plot(log: RunLog, out: Path | None, formats: Sequence[str], json: bool) -> None:
-    from quasilpv.experiments.logged import logged_result
-    from quasilpv.figures.gallery import write_gallery
-
     folder = out or Path(log.source).parent
     claim_folder(folder)
-    files = write_gallery(logged_result(log), folder, formats)
+    files = _draw(log, folder, formats)
     if json:
         print_json({"figures": [str(path) for path in files]})
     else:
         print_note(f"wrote {', '.join(path.name for path in files)} in {files[0].parent}")
+
+
+def _draw(log: RunLog, folder: Path, formats: Sequence[str]) -> Sequence[Path]:
+    if log.is_of_system:
+        from quasilpv.experiments.system_logged import logged_system_run
+        from quasilpv.figures.systems import draw_system_run
+
+        return draw_system_run(logged_system_run(log), folder, formats)
+    from quasilpv.experiments.logged import logged_result
+    from quasilpv.figures.gallery import write_gallery
+
+    return write_gallery(logged_result(log), folder, formats)
 
 
 def _replay(log: RunLog, _: Path | None, json: bool) -> None:
@@ -152,9 +179,10 @@ def _replay(log: RunLog, _: Path | None, json: bool) -> None:
 
     shown = replay(log)
     if json:
-        print_json({"log": log.source, "artifact_hash": log.artifact.hash, **asdict(shown)})
+        print_json({"log": log.source, "artifact_hash": log.any_artifact.hash, **asdict(shown)})
+    what = "inputs" if log.is_of_system else "torques"
     if shown.first_difference is not None:
-        raise ClaimError(f"{log.source}: {shown.first_difference}; expected identical torques")
+        raise ClaimError(f"{log.source}: {shown.first_difference}; expected identical {what}")
     if not json:
         until = "" if shown.fault_seq is None else f", up to the fault at sample {shown.fault_seq}"
         print(f"{shown.samples} samples replayed, {shown.compared} commands compared: identical, bit for bit{until}")

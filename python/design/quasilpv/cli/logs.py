@@ -37,6 +37,7 @@ def open_log(text: str, artifact: Path | None) -> RunLog:
         InputError: it cannot be read, or it is of a run with another controller.
     """
     from quasilpv.artifact import read_artifact
+    from quasilpv.artifact.system_store import read_system_artifact
     from quasilpv.telemetry import read_log
 
     log = read_log(log_path(text))
@@ -45,4 +46,6 @@ def open_log(text: str, artifact: Path | None) -> RunLog:
             f"warning: {log.source}: {log.incomplete_bytes} bytes of an event that was not written whole are left out; "
             f"the last whole one is of sample {log.last_seq}"
         )
-    return log if artifact is None else log.require_artifact(read_artifact(artifact))
+    if artifact is None:
+        return log
+    return log.require_artifact(read_system_artifact(artifact) or read_artifact(artifact))

@@ -39,7 +39,8 @@ def simulate_command(
     quantisation: QuantisationOption = None,
     seed: SeedOption = None,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="DIR", help="Draw figures of the run into this folder.")
+        Path | None,
+        typer.Option("-o", "--out", metavar="DIR", help="Write figures and the log of the run into this folder."),
     ] = None,
     figure_formats: FormatOption = None,
     json: JsonOption = False,
@@ -68,8 +69,10 @@ def simulate_command(
         for note in notes_of(run):
             print_note(note)
     if out is not None:
+        from quasilpv.experiments.system_logged import write_log
         from quasilpv.figures.systems import draw_system_run
+        from quasilpv.telemetry import LOG_NAME
 
-        for path in draw_system_run(run, out, formats):
+        for path in [*draw_system_run(run, out, formats), write_log(out / LOG_NAME, run)]:
             print_note(f"wrote {path}")
     return code_of(run)

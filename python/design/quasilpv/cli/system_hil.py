@@ -41,7 +41,7 @@ def run_system(path: Path, options: SystemOptions, pace: Pacing, *, out: Path, l
         steps.end()
         steps.begin("over LCM")
         talk = pace.talk(WATCHDOG_SAMPLES * artifact.sample_period_s)
-        over_lcm = run_system_over_lcm(artifact, scenario, folder, talk)
+        over_lcm = run_system_over_lcm(artifact, scenario, folder, talk, log=log)
         steps.end()
     if not pace.real_time and over_lcm.stop is None:
         require_identical(over_lcm.run, in_process)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,16 @@ import numpy as np
 
 from quasilpv.arrays import FloatArray
 from quasilpv.artifact.system_store import write_system_artifact
-from quasilpv.documents.system_artifact import SystemArtifactDocument
+from quasilpv.documents.system_artifact import Signal, SystemArtifactDocument
 from quasilpv.errors import ClaimError
 from quasilpv.experiments.fault import Fault, fault_of
 from quasilpv.experiments.processes import CONTROLLER, SIMULATOR, Mode, Talk, common_samples, read_table, run_both
-from quasilpv.experiments.system_run import SystemRun, flags_in_words, level_of
+from quasilpv.experiments.system_run import SystemRun, level_of
 from quasilpv.scenarios import SystemScenario, write_system_scenario
+from quasilpv.telemetry import LOG_NAME, RunHeader
+from quasilpv.telemetry.log import point_to
+from quasilpv.telemetry.recorder import Recorder
+from quasilpv.telemetry.system_recording import CONTROLLER_NAME, SystemRunDocuments
 
 SCENARIO_NAME = "scenario.json"
 LEFT_DOMAIN = "left_domain"
@@ -42,15 +47,16 @@ class SystemHilResult:
 
 
 def run_system_over_lcm(
-    artifact: SystemArtifactDocument, scenario: SystemScenario, folder: Path, talk: Talk
+    artifact: SystemArtifactDocument, scenario: SystemScenario, folder: Path, talk: Talk, *, log: bool = True
 ) -> SystemHilResult:
-    """Run controller and plant as two processes on this machine.
+    """Run controller and plant as two processes on this machine; log what they say.
 
     Args:
         artifact: the controller, and the equations of the plant.
         scenario: what is run.
-        folder: where the files of the run and both records are written.
+        folder: where the files of the run, both records and the log are written.
         talk: how both talk.
+        log: whether one is written.
 
     Raises:
         InputError: an executable is missing, or the folder cannot be written.
@@ -64,10 +70,23 @@ def run_system_over_lcm(
     }
     records = {CONTROLLER: folder / "controller.csv", SIMULATOR: folder / "plant.csv"}
     commands = talk.commands(path, inputs, records)
-    reports, said = run_both(commands, talk.limit_s(scenario.samples * artifact.sample_period_s))
-    plant, controller = read_table(records[SIMULATOR]), read_table(records[CONTROLLER])
+    place = folder / LOG_NAME
+    documents = SystemRunDocuments(RunHeader(mode=talk.mode, controller=CONTROLLER_NAME), artifact, scenario)
+    if log:  # the log in this place is of this run or there is none
+        place.unlink(missing_ok=True)
+    with Recorder(talk.url, place, documents) if log else nullcontext() as recorder:
+        reports, said = run_both(commands, talk.limit_s(scenario.samples * artifact.sample_period_s))
+        plant, controller = read_table(records[SIMULATOR]), read_table(records[CONTROLLER])
+        if recorder is not None:
+            truth = {
+                "state": _stacked(plant, "state", artifact.states),
+                "input": _stacked(plant, "input", artifact.inputs),
+            }
+            recorder.add_truth({"seq": plant["seq"], **truth})
+    if log:
+        point_to(place)
     columns = common_samples(records[SIMULATOR], records[CONTROLLER], plant, controller)
-    run = _run_of(artifact, scenario, columns, reports)
+    run = _run_of(artifact, scenario, columns, reports[SIMULATOR][LEFT_DOMAIN])
     stop = None
     if said is not None and run.exit is None:
         stop = fault_of(said, reports[CONTROLLER], controller, plant, artifact.sample_period_s)
@@ -85,27 +104,31 @@ def require_identical(over_lcm: SystemRun, in_process: SystemRun) -> None:
         raise ClaimError(f"lock-step over LCM and in process: {difference}, expected identical samples")
 
 
+def _stacked(columns: Mapping[str, FloatArray], what: str, signals: tuple[Signal, ...]) -> FloatArray:
+    return np.column_stack([columns[f"{what}.{signal.name}"] for signal in signals])
+
+
 def _run_of(
     artifact: SystemArtifactDocument,
     scenario: SystemScenario,
     columns: Mapping[str, FloatArray],
-    reports: Mapping[str, dict[str, Any]],
+    left: Mapping[str, Any] | None,
 ) -> SystemRun:
-    def of(what: str, role: str) -> FloatArray:
-        signals = artifact.states if role == "state" else artifact.inputs
-        return np.column_stack([columns[f"{what}.{signal.name}"] for signal in signals])
-
-    left = reports[SIMULATOR][LEFT_DOMAIN]
-    state = of("state", "state")
+    """A run from the columns of both records, and where the plant says that a state left its domain."""
+    state = _stacked(columns, "state", artifact.states)
+    count = len(artifact.model.names)
+    premises = [f"premise_{k}" for k in range(count)] if count > 1 else ["premise"] * count
     return SystemRun(
         artifact=artifact,
         scenario=scenario,
         time_s=columns["time_s"],
         state=state,
-        measured=of("measured", "state"),
-        input=of("input", "input"),
+        measured=_stacked(columns, "measured", artifact.states),
+        input=_stacked(columns, "input", artifact.inputs),
+        commanded=_stacked(columns, "commanded", artifact.inputs),
+        premise=np.array([columns[name] for name in premises]).reshape(count, len(state)).T,
         level=level_of(artifact, state),
         measured_level=columns["level"],
-        flags=flags_in_words(reports[CONTROLLER]["flags"]),
+        sample_flags=columns["flags"].astype(np.int64),
         exit=None if left is None else (float(left["time_s"]), str(left["signal"])),
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from quasilpv import _runtime
 from quasilpv.arrays import FloatArray
@@ -15,14 +16,8 @@ from quasilpv.documents.system_artifact import SystemArtifactDocument
 from quasilpv.errors import InputError
 from quasilpv.scenarios import NOISE_SEED, IdaIntegrator, Rk4Integrator, SystemScenario
 from quasilpv.scenarios.system_schema import MOST_SAMPLES, SystemSensors, values_by_name
+from quasilpv.telemetry.codes import SYSTEM_FLAGS
 
-FLAGS = {
-    1: "signal invalid",
-    2: "premise outside its box",
-    4: "input at its limit",
-    8: "input not finite",
-    16: "outside the region",
-}
 SETTLING_TIMES = 6.0
 """Length of a run if none is stated, in units of 1 / decay rate."""
 
@@ -63,10 +58,11 @@ class SystemRun:
         scenario: what was run.
         time_s: of the samples, (N,).
         state, measured: (N, n), the truth and what the controller was told of it, with their trim.
-        input: (N, m), with its trim.
+        input, commanded: (N, m), what acted and what the law asked for before limits, with their trim.
+        premise: (N, p), clamped to its box.
         level: V of the truth, (N,): at most 1 in the region.
         measured_level: V as the controller saw it, (N,).
-        flags: of all samples, in words.
+        sample_flags: (N,), bits of `codes.SYSTEM_FLAGS`.
         exit: when a state left its domain, and which; None if none did.
     """
 
@@ -76,10 +72,18 @@ class SystemRun:
     state: FloatArray
     measured: FloatArray
     input: FloatArray
+    commanded: FloatArray
+    premise: FloatArray
     level: FloatArray
     measured_level: FloatArray
-    flags: tuple[str, ...]
+    sample_flags: npt.NDArray[np.int64]
     exit: tuple[float, str] | None
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What happened in any sample, in words."""
+        union = int(np.bitwise_or.reduce(self.sample_flags))
+        return tuple(text for bit, text in SYSTEM_FLAGS.items() if union & bit)
 
     @property
     def stayed(self) -> bool:
@@ -91,7 +95,7 @@ class SystemRun:
         """In words, the first sample in which two runs differ in any bit; None if there is none."""
         if len(self.time_s) != len(other.time_s):
             return f"{len(self.time_s)} samples and {len(other.time_s)}"
-        for name in ("time_s", "state", "measured", "input", "measured_level"):
+        for name in ("time_s", "state", "measured", "input", "commanded", "premise", "measured_level"):
             mine, theirs = (np.ascontiguousarray(getattr(run, name), dtype=np.float64) for run in (self, other))
             different = np.flatnonzero(
                 (mine.view(np.int64) != theirs.view(np.int64)).reshape(len(mine), -1).any(axis=1)
@@ -200,16 +204,13 @@ def simulate_scenario(artifact: SystemArtifactDocument, scenario: SystemScenario
         state=columns["state"],
         measured=columns["measured"],
         input=columns["input"],
+        commanded=columns["commanded"],
+        premise=columns.get("premise", np.empty((len(columns["state"]), 0))),
         level=level_of(artifact, columns["state"]),
         measured_level=columns["level"][:, 0],
-        flags=flags_in_words(found["flags"]),
+        sample_flags=columns["flags"][:, 0].astype(np.int64),
         exit=found["exit"],
     )
-
-
-def flags_in_words(flags: int) -> tuple[str, ...]:
-    """What happened in a run, from the union of the flags of its samples."""
-    return tuple(text for bit, text in FLAGS.items() if flags & bit)
 
 
 def level_of(artifact: SystemArtifactDocument, state: FloatArray) -> FloatArray:

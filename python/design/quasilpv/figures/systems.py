@@ -33,24 +33,36 @@ def signals_figure(run: SystemRun) -> Figure:
     artifact = run.artifact
     signals = [*artifact.states, *artifact.inputs]
     values = np.hstack([run.state, run.input])
+    exact = run.scenario.has_exact_sensors
     rows = len(signals) + 1
     with style():
-        figure = new_figure(1.0 + 1.05 * rows, f"{artifact.name}: the nonlinear plant under the sampled law")
+        title = "the nonlinear plant under the sampled law"
+        if run.exit is not None:
+            title = f"{run.exit[1]} leaves its domain at {run.exit[0]:.6g} s"
+        figure = new_figure(1.0 + 1.05 * rows, f"{artifact.name}: {title}")
         axes = figure.subplots(rows, 1, sharex=True)
         for k, signal in enumerate(signals):
             is_input = signal.role == "input"
             draw = axes[k].step if is_input else axes[k].plot
             where = {"where": "post"} if is_input else {}
+            if not is_input and not exact:
+                axes[k].plot(run.time_s, run.measured[:, k], ".", color=REFERENCE_COLOUR, markersize=2.5)
             draw(run.time_s, values[:, k], color=VERMILION if is_input else BLUE, **where)
             _limits(axes[k], signal, values[:, k])
-            axes[k].set_ylabel(signal.name, rotation=0, ha="right", va="center")
+            axes[k].set_ylabel(_name(signal), rotation=0, ha="right", va="center")
         level = np.maximum(run.level, 1e-12)
         axes[-1].semilogy(run.time_s, level, color=GREEN)
         axes[-1].axhline(1.0, color=BLACK, linewidth=0.8, linestyle=(0, (4, 2)))
         axes[-1].set_ylim(bottom=max(float(level.min()) / 2.0, 1e-10))
         axes[-1].set_ylabel("V", rotation=0, ha="right", va="center")
-        axes[-1].set_xlabel("time (s); states blue, inputs red, V ≤ 1 in the region, limits dashed")
+        told = "" if exact else ", measured grey"
+        axes[-1].set_xlabel(f"time (s); states blue{told}, inputs red, V ≤ 1 in the region, limits dashed")
         return figure
+
+
+def _name(signal: Signal) -> str:
+    """With its unit, if it has one."""
+    return signal.name if signal.unit in ("", "1") else f"{signal.name} ({signal.unit})"
 
 
 def _limits(axes: Axes, signal: Signal, values: FloatArray) -> None:
@@ -106,8 +118,8 @@ def _plane(axes: Axes, run: SystemRun, P: FloatArray, pair: tuple[int, int]) -> 
     axes.plot([], [], label="domain", **dashes)
     axes.plot(run.state[:, i], run.state[:, j], color=VERMILION, label="the run")
     axes.plot(run.state[0, i], run.state[0, j], marker="o", markersize=3, color=VERMILION)
-    axes.set_xlabel(states[i].name)
-    axes.set_ylabel(states[j].name)
+    axes.set_xlabel(_name(states[i]))
+    axes.set_ylabel(_name(states[j]))
 
 
 def _ellipse(P: FloatArray) -> FloatArray:

@@ -23,11 +23,21 @@ from quasilpv.artifact import Artifact
 from quasilpv.defaults import LAST
 from quasilpv.documents.canonical import canonical_json, parse_document, parse_strict_json
 from quasilpv.documents.strict_model import StrictModel, validate
+from quasilpv.documents.system_artifact import SystemArtifactDocument
 from quasilpv.errors import InputError
 from quasilpv.files import write_atomically
-from quasilpv.scenarios import Scenario
+from quasilpv.scenarios import Scenario, SystemScenario
 from quasilpv.telemetry.event_log import SUFFIX, Event, read_events
-from quasilpv.telemetry.message_types import CHANNELS, MessageType, Records, logged_type
+from quasilpv.telemetry.message_types import (
+    CHANNELS,
+    EVENTS,
+    ROBOT_CHANNELS,
+    SYSTEM_CHANNELS,
+    SYSTEM_PREFIX,
+    MessageType,
+    Records,
+    logged_type,
+)
 from quasilpv.trajectories import Trajectory
 
 Mode: TypeAlias = Literal["in-process", "lockstep", "realtime"]
@@ -109,7 +119,7 @@ class RunLog:
     Attributes:
         source: its file, for messages.
         documents: JSON bytes of those of `DOCUMENT_CHANNELS` it holds.
-        channels: by name, those of `message_types.CHANNELS`; empty ones too.
+        channels: by name, those of `message_types.ROBOT_CHANNELS` or `SYSTEM_CHANNELS`; empty ones too.
         foreign: how many events there are on every other channel.
         incomplete_bytes: behind the last whole event, see `EventLog`.
     """
@@ -121,8 +131,14 @@ class RunLog:
     incomplete_bytes: int = 0
 
     def __getitem__(self, channel: str) -> Messages:
-        """The messages of a channel, given without its prefix, e.g. ``"telemetry"``."""
-        return self.channels[f"QLPV_{channel.upper()}"]
+        """The messages of a channel, given without its prefix, e.g. ``"telemetry"``, of a robot or of a system."""
+        own = f"{SYSTEM_PREFIX}{channel.upper()}"
+        return self.channels[own if own in self.channels else f"QLPV_{channel.upper()}"]
+
+    @property
+    def is_of_system(self) -> bool:
+        """Whether it is of a general system."""
+        return f"{SYSTEM_PREFIX}TELEMETRY" in self.channels
 
     @cached_property
     def header(self) -> RunHeader:
@@ -133,14 +149,33 @@ class RunLog:
     def artifact(self) -> Artifact:
         """The controller. InputError: missing, damaged, or not the one the messages name."""
         source = f"{self.source}: {ARTIFACT}"
+        if self.is_of_system:
+            raise InputError(source, "schema", "a controller of a system", "one of a robot")
         artifact = Artifact.from_document(parse_document(self._document(ARTIFACT), source), source)
+        self._require_hash(artifact.name, artifact.hash)
+        return artifact
+
+    @cached_property
+    def system_artifact(self) -> SystemArtifactDocument:
+        """The controller of a general system. InputError: as `artifact`."""
+        source = f"{self.source}: {ARTIFACT}"
+        document = parse_document(self._document(ARTIFACT), source)
+        content = {key: value for key, value in document.items() if key != "hash"}
+        artifact = validate(SystemArtifactDocument, content, source)
+        self._require_hash(artifact.name, artifact.hash)
+        return artifact
+
+    @property
+    def any_artifact(self) -> Artifact | SystemArtifactDocument:
+        """The controller, of either kind."""
+        return self.system_artifact if self.is_of_system else self.artifact
+
+    def _require_hash(self, name: str, digest: str) -> None:
         for channel, messages in self.channels.items():
-            others = set(messages.records["artifact_hash"].tolist()) - {hash_prefix(artifact.hash)}
+            others = set(messages.records["artifact_hash"].tolist()) - {hash_prefix(digest)}
             if others:
                 got = f"{min(others) & 0xFFFF_FFFF_FFFF_FFFF:016x}..."
-                expected = f"{artifact.hash[:16]}..., {artifact.name}"
-                raise InputError(self.source, f"{channel}.artifact_hash", got, expected)
-        return artifact
+                raise InputError(self.source, f"{channel}.artifact_hash", got, f"{digest[:16]}..., {name}")
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -154,10 +189,17 @@ class RunLog:
         source = f"{self.source}: {SCENARIO}"
         return Scenario.from_document(parse_strict_json(self._document(SCENARIO), source), source)
 
+    @cached_property
+    def system_scenario(self) -> SystemScenario:
+        """What a general system went through. InputError: missing, damaged, or of another system."""
+        source = f"{self.source}: {SCENARIO}"
+        scenario = SystemScenario.from_document(parse_strict_json(self._document(SCENARIO), source), source)
+        return scenario.require_names_of(self.system_artifact, source)
+
     @property
     def last_seq(self) -> int:
         """The last sample that any message is about, events apart; -1 if there is none."""
-        sampled = (messages.samples["seq"] for name, messages in self.channels.items() if name != "QLPV_EVENT")
+        sampled = (messages.samples["seq"] for name, messages in self.channels.items() if name != EVENTS)
         return max((int(seq[-1]) for seq in sampled if seq.size), default=-1)
 
     @property
@@ -166,17 +208,18 @@ class RunLog:
         times = [messages.utime for messages in self.channels.values() if messages.utime.size]
         return 1e-6 * (max(int(t[-1]) for t in times) - min(int(t[0]) for t in times)) if times else 0.0
 
-    def require_artifact(self, artifact: Artifact) -> RunLog:
+    def require_artifact(self, artifact: Artifact | SystemArtifactDocument) -> RunLog:
         """The log, of which it is sure that ``artifact`` was its controller; if it holds none, then it does now.
 
         Raises:
             InputError: it was another one.
         """
-        if ARTIFACT in self.documents and self.artifact.hash != artifact.hash:
-            raise InputError(self.source, "artifact.hash", f"{self.artifact.hash[:16]}...", f"{artifact.hash[:16]}...")
+        if ARTIFACT in self.documents and self.any_artifact.hash != artifact.hash:
+            own = self.any_artifact.hash
+            raise InputError(self.source, "artifact.hash", f"{own[:16]}...", f"{artifact.hash[:16]}...")
         document = canonical_json(artifact.to_document())
         completed = replace(self, documents={**self.documents, ARTIFACT: document})
-        assert completed.artifact.hash == artifact.hash
+        assert completed.any_artifact.hash == artifact.hash
         return completed
 
     def _document(self, channel: str) -> bytes:
@@ -204,10 +247,12 @@ def read_log(path: Path | str) -> RunLog:
             foreign[event.channel] += 1
     if not documents and not any(packets.values()):
         raise InputError(str(path), "channels", ", ".join(foreign) or "none", f"at least one of {', '.join(CHANNELS)}")
+    of_system = any(packets[channel] for channel in SYSTEM_CHANNELS if channel != EVENTS)
     channels = {
-        channel: _decode(logged_type(channel, [event.data for event in events]), events)
-        for channel, events in packets.items()
+        channel: _decode(logged_type(channel, [event.data for event in packets[channel]]), packets[channel])
+        for channel in (SYSTEM_CHANNELS if of_system else ROBOT_CHANNELS)
     }
+    foreign.update({channel: len(found) for channel, found in packets.items() if found and channel not in channels})
     return RunLog(str(path), documents, channels, dict(foreign), read.incomplete_bytes)
 
 

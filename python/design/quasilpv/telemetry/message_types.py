@@ -27,8 +27,19 @@ CHANNELS = {
     "QLPV_TELEMETRY": ("telemetry_v2", "telemetry_v1"),
     "QLPV_EVENT": ("event_v2", "event_v1"),
     "QLPV_TRUTH": ("truth_v2", "truth_v1"),
+    "QLPV_SIGNALS_MEASUREMENT": ("signals_measurement_v1",),
+    "QLPV_SIGNALS_COMMAND": ("signals_command_v1",),
+    "QLPV_SIGNALS_TELEMETRY": ("signals_telemetry_v1",),
+    "QLPV_SIGNALS_TRUTH": ("signals_truth_v1",),
 }
 """Types of the messages on each channel: the one that is sent, and before it those that logs may hold."""
+
+EVENTS = "QLPV_EVENT"
+SYSTEM_PREFIX = "QLPV_SIGNALS_"
+SYSTEM_CHANNELS = (*(name for name in CHANNELS if name.startswith(SYSTEM_PREFIX)), EVENTS)
+"""Those of a run of a general system."""
+ROBOT_CHANNELS = tuple(name for name in CHANNELS if not name.startswith(SYSTEM_PREFIX))
+"""Those of a run of a robot."""
 
 CRC_BYTES = 8
 TAG_BYTES = 16

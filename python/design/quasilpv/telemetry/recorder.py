@@ -7,17 +7,33 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import ClassVar, Protocol, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from quasilpv.telemetry.event_log import Event, write_events
 from quasilpv.telemetry.listening import listen
-from quasilpv.telemetry.message_types import channel_type
-from quasilpv.telemetry.recording import Columns, RunDocuments, messages
+from quasilpv.telemetry.message_types import Records, channel_type
+from quasilpv.telemetry.recording import Columns
 
 _POLL_MS = 20
 _LINGER_MS = 250
+
+
+class LoggedRun(Protocol):
+    """What a log has to know of a run besides what is sent."""
+
+    measurement: ClassVar[str]
+    """Channel of what the plant sends once per sample."""
+    truth: ClassVar[str]
+    """Channel, in logs only, of what no sensor tells."""
+
+    def events(self, utime: int) -> Iterator[Event]:
+        """The documents of the run, at one time."""
+
+    def truth_records(self, seq: npt.NDArray[np.int64], columns: Columns, session: int) -> Records:
+        """The messages about these samples, from the columns of the plant's record."""
 
 
 class Recorder:
@@ -31,7 +47,7 @@ class Recorder:
         documents: of the run.
     """
 
-    def __init__(self, url: str, path: Path, documents: RunDocuments) -> None:
+    def __init__(self, url: str, path: Path, documents: LoggedRun) -> None:
         """Nothing is heard before `with`."""
         self._url, self._path, self._documents = url, path, documents
         self._heard: list[Event] = []
@@ -73,17 +89,18 @@ class Recorder:
         """The plant's samples at the time its measurements were heard; of unheard measurements nothing is logged."""
         if self._truth is None:
             return
-        kind = channel_type("QLPV_MEASUREMENT")
-        valid = [event for event in self._heard if event.channel == "QLPV_MEASUREMENT" and not kind.refusal(event.data)]
+        channel = self._documents.measurement
+        kind = channel_type(channel)
+        valid = [event for event in self._heard if event.channel == channel and not kind.refusal(event.data)]
         measurements = kind.decode([event.data for event in valid])
         times = {int(m["seq"]): event.utime for m, event in zip(measurements[::-1], valid[::-1], strict=True)}
         seq = self._truth["seq"].astype(np.int64)
         session = int(measurements["session"][0]) if measurements.size else 0
-        records = messages("QLPV_TRUTH", self._documents.artifact, seq, self._truth, session=session)
-        truth = channel_type("QLPV_TRUTH")
+        records = self._documents.truth_records(seq, self._truth, session)
+        truth = channel_type(self._documents.truth)
         for k, packet in zip(seq, truth.encode(records), strict=True):
             if int(k) in times:
-                yield Event(times[int(k)], "QLPV_TRUTH", packet)
+                yield Event(times[int(k)], self._documents.truth, packet)
 
 
 def _now_us() -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -72,6 +72,9 @@ class RunDocuments:
         scenario: the experiment.
     """
 
+    measurement: ClassVar[str] = "QLPV_MEASUREMENT"
+    truth: ClassVar[str] = "QLPV_TRUTH"
+
     header: RunHeader
     artifact: Artifact
     trajectory: Trajectory
@@ -86,6 +89,10 @@ class RunDocuments:
             (SCENARIO, self.scenario.to_document()),
         ):
             yield Event(utime, channel, canonical_json(document))
+
+    def truth_records(self, seq: npt.NDArray[np.int64], columns: Columns, session: int) -> Records:
+        """The messages about the truth, from the columns of the plant's record."""
+        return messages(self.truth, self.artifact, seq, columns, session=session)
 
 
 def write_run(path: Path, documents: RunDocuments, columns: Columns) -> Path:
@@ -134,7 +141,7 @@ def messages(
     """
     records = channel_type(channel).new(seq.size)
     records["utime"] = np.rint(1e6 * seq * artifact.sample_period_s)
-    _introduce(records, artifact)
+    introduce(records, artifact.sample_period_s)
     records["seq"], records["session"], records["joints"] = seq, session, artifact.joints
     records["artifact_hash"] = hash_prefix(artifact.hash)
     if channel == "QLPV_TRUTH":
@@ -146,11 +153,11 @@ def messages(
     return records
 
 
-def _introduce(records: Records, artifact: Artifact) -> None:
+def introduce(records: Records, sample_period_s: float) -> None:
     """Say how the sender runs, where messages say so: in lock-step, at the rate of its artifact; in one process nobody
     has a name."""
     if "period_ns" in (records.dtype.names or ()):
-        records["period_ns"] = round(1e9 * artifact.sample_period_s)
+        records["period_ns"] = round(1e9 * sample_period_s)
 
 
 def columns_of(channel: str, records: Records, joints: int) -> dict[str, FloatArray]:
@@ -165,25 +172,44 @@ def columns_of(channel: str, records: Records, joints: int) -> dict[str, FloatAr
 
 
 def _in_order(documents: RunDocuments, streams: Mapping[str, Records]) -> Iterator[Event]:
-    yield from documents.events(0)
-    times = streams["QLPV_TELEMETRY"]["utime"].tolist()
+    artifact = documents.artifact
+    yield from run_events(documents.events(0), artifact.hash, artifact.sample_period_s, streams)
+
+
+def run_events(
+    documents: Iterator[Event], artifact_hash: str, sample_period_s: float, streams: Mapping[str, Records]
+) -> Iterator[Event]:
+    """A log of a run in one process: its documents, both sides' start, the messages sample by sample, both ends.
+
+    Args:
+        documents: of the run.
+        artifact_hash: of the controller.
+        sample_period_s: T.
+        streams: by channel one message per sample.
+    """
+    yield from documents
+    times = next(iter(streams.values()))["utime"].tolist()
     for source in (CONTROLLER, PLANT):
-        yield _run_event(documents.artifact, source, STARTED, 0, 0)
+        yield run_event(artifact_hash, sample_period_s, source=source, code=STARTED, utime=0, seq=0)
     packets = [channel_type(channel).encode(records) for channel, records in streams.items()]
     for utime, *sample in zip(times, *packets, strict=True):
         for channel, packet in zip(streams, sample, strict=True):
             yield Event(utime, channel, packet)
     for source in (PLANT, CONTROLLER):
-        yield _run_event(documents.artifact, source, ENDED, times[-1], len(times) - 1)
+        yield run_event(artifact_hash, sample_period_s, source=source, code=ENDED, utime=times[-1], seq=len(times) - 1)
 
 
-def _run_event(artifact: Artifact, source: int, code: int, utime: int, seq: int) -> Event:
+def run_event(
+    artifact_hash: str, sample_period_s: float, *, source: int, code: int, utime: int, seq: int, detail: int = 0
+) -> Event:
+    """One event of a run in one process."""
     kind = channel_type("QLPV_EVENT")
     records = kind.new(1)
-    members = {"utime": utime, "seq": seq, "artifact_hash": hash_prefix(artifact.hash), "source": source, "code": code}
+    members = {"utime": utime, "seq": seq, "artifact_hash": hash_prefix(artifact_hash), "source": source, "code": code}
     for name, value in members.items():
         records[name] = value
-    _introduce(records, artifact)
+    records["detail"][0, 0] = detail
+    introduce(records, sample_period_s)
     return Event(utime, "QLPV_EVENT", kind.encode(records)[0])
 
 

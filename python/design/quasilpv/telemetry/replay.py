@@ -43,6 +43,8 @@ def replay(log: RunLog) -> Replay:
     """
     if log.header.mode == "realtime":
         raise InputError(log.source, "mode", "realtime", "in-process or lockstep: only lock-step is replayed")
+    if log.is_of_system:
+        return _replay_system(log)
     artifact = log.artifact
     runtime = _runtime.Artifact.parse(canonical_json(artifact.to_document()), log.source)
     trajectory = _runtime.Trajectory.parse(canonical_json(log.trajectory.to_document()), log.source)
@@ -62,13 +64,73 @@ def replay(log: RunLog) -> Replay:
     return Replay(len(measured), compared, difference, None)
 
 
-def _difference(k: int, torque: FloatArray, command: Any) -> str | None:
-    """In words, whether a torque is the commanded one, bit by bit: NaN equals NaN, 0 differs from -0."""
-    logged = np.ascontiguousarray(command["torque_nm"][: torque.size])
-    different = np.flatnonzero(logged.view(np.int64) != np.ascontiguousarray(torque).view(np.int64))
-    if not different.size:
+def _replay_system(log: RunLog) -> Replay:
+    """The same of a general system, whose measurements say what the law was told of the parameters too."""
+    artifact = log.system_artifact
+    runtime = _runtime.SystemArtifact.parse(canonical_json(artifact.to_document()), log.source)
+    controller, n = _runtime.SystemController(runtime), len(artifact.states)
+    names = [signal.name for signal in artifact.inputs]
+    told, commands = _told(log), {int(c["seq"]): c for c in log["command"].samples}
+    compared, difference = 0, None
+    for k, value in enumerate(told):
+        command = commands.get(k)
+        if command is not None and command["state"] == FAULT:
+            return Replay(k, compared, difference, k)
+        report = controller.step(value[:n], value[n : n + len(artifact.parameters)])
+        if command is None:
+            continue
+        compared += 1
+        difference = difference or _different_input(k, report["input"], command["input"][: len(names)], names)
+    return Replay(len(told), compared, difference, None)
+
+
+def _told(log: RunLog) -> list[FloatArray]:
+    """What a law was told in every sample from 0 to the last; where its measurement is missing, from telemetry.
+
+    Telemetry repeats the states only; the parameters are those of any measurement, because they do not change in a run.
+    """
+    artifact = log.system_artifact
+    n = len(artifact.states)
+    measurements, telemetry = log["measurement"].samples, log["telemetry"].samples
+    if not measurements.size:
+        raise InputError(log.source, "measurements", "none", "at least one, in QLPV_SIGNALS_MEASUREMENT")
+    found = {int(record["seq"]): np.asarray(record["value"]) for record in measurements}
+    for record in telemetry:
+        value = np.array(measurements[0]["value"])
+        value[:n] = record["measured"][:n]
+        found.setdefault(int(record["seq"]), value)
+    return _complete(log, found)
+
+
+def _complete(log: RunLog, found: dict[int, Any]) -> list[Any]:
+    """The entries of every sample from 0 to the last. InputError: one is missing."""
+    missing = sorted(set(range(max(found) + 1)) - set(found))
+    if missing:
+        raise InputError(log.source, "measurements", f"none of sample {missing[0]}", "every sample from 0 to the last")
+    return [found[k] for k in range(max(found) + 1)]
+
+
+def _different_input(k: int, given: FloatArray, logged: Any, names: list[str]) -> str | None:
+    """In words, whether an input is the commanded one, bit by bit."""
+    index = _first_different_bits(given, logged)
+    if index is None:
         return None
-    joint = int(different[0])
+    return f"sample {k}, input {names[index]}: {float(logged[index])!r} in the log, {float(given[index])!r} replayed"
+
+
+def _first_different_bits(ours: FloatArray, theirs: Any) -> int | None:
+    """Where two rows of numbers differ first, bit by bit: NaN equals NaN, 0 differs from -0."""
+    mine, other = (np.ascontiguousarray(row, dtype=np.float64).view(np.int64) for row in (ours, theirs))
+    different = np.flatnonzero(mine != other)
+    return int(different[0]) if different.size else None
+
+
+def _difference(k: int, torque: FloatArray, command: Any) -> str | None:
+    """In words, whether a torque is the commanded one, bit by bit."""
+    logged = command["torque_nm"][: torque.size]
+    joint = _first_different_bits(torque, logged)
+    if joint is None:
+        return None
     return f"sample {k}, joint {joint + 1}: {float(logged[joint])!r} N m in the log, {float(torque[joint])!r} replayed"
 
 
@@ -104,7 +166,4 @@ def _measured(log: RunLog) -> list[_Reading]:
     }
     if not found:
         raise InputError(log.source, "measurements", "none", "at least one, in QLPV_MEASUREMENT or QLPV_TELEMETRY")
-    missing = sorted(set(range(max(found) + 1)) - set(found))
-    if missing:
-        raise InputError(log.source, "measurements", f"none of sample {missing[0]}", "every sample from 0 to the last")
-    return [found[k] for k in range(max(found) + 1)]
+    return _complete(log, found)
