@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from math import inf, isfinite
 
 import numpy as np
@@ -31,8 +32,8 @@ from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.regional.request import RegionalRequest
 from quasilpv.systems.descriptor.system import DescriptorSystem
 
-BACK_OFF = 0.02
-"""Of the optimum, given up for room in which exact arithmetic can confirm the inequalities."""
+BACK_OFFS = (0.001, 0.02)
+"""Of the optimum, given up for room in which exact arithmetic can confirm the inequalities; the next if one fails."""
 
 DEFAULT_DECAY = 0.1
 """Decay rate if none is asked for, in units of the time in which the system moves by as much as it is."""
@@ -82,8 +83,15 @@ class RegionalDesign:
         return np.asarray(np.sqrt(np.diag(self.lyapunov)))
 
 
-def design_feedback(request: RegionalRequest, progress: Progress = no_progress) -> RegionalDesign:
+def design_feedback(
+    request: RegionalRequest, progress: Progress = no_progress, most_units: int | None = None
+) -> RegionalDesign:
     """The best feedback and region.
+
+    Args:
+        request: what is asked for.
+        progress: called with (steps done, steps in all).
+        most_units: so many units are tried; None for all of them.
 
     Raises:
         InputError: nothing bounds the region in some direction, a domain does not hold the trim, or what the
@@ -97,7 +105,7 @@ def design_feedback(request: RegionalRequest, progress: Progress = no_progress) 
     model = polytopic_model(replace(request.system, premises=widened), REPRESENTATION)
     refuse_refuted("regional feedback", COMPENSATION, model)
     found: list[RegionalDesign] = []
-    for units in _units(request):
+    for units in islice(_units(request), most_units):
         search = _Search(request, model, units)
         design = search.fastest(progress) if request.objective == "fastest" else search.best()
         if design is not None:
@@ -189,7 +197,7 @@ class _Search:
             statement.problem.minimise(share)
         else:
             statement.problem.minimise(-geometric_mean_of_eigenvalues(statement.problem, statement.P))
-        return self._design(statement, statement.problem.solve_inside(BACK_OFF), self.decay_rate)
+        return self._inside(statement, self.decay_rate)
 
     def fastest(self, progress: Progress) -> RegionalDesign | None:
         """By bisection: the inequalities are not linear in the decay rate."""
@@ -199,7 +207,7 @@ class _Search:
             rate = high if best is None or low == high / 2.0 else 0.5 * (low + high)
             statement = self._statement(self.limits(rate))
             self._cover(statement)
-            found = self._design(statement, statement.problem.solve_inside(BACK_OFF), rate)
+            found = self._inside(statement, rate)
             if found is not None:
                 low, best = rate, found
                 high = 2.0 * rate if rate == high else high
@@ -224,6 +232,14 @@ class _Search:
         choose[np.arange(len(bounded)), bounded] = 1
         floor = np.diag((self.request.share * bounds[bounded]) ** 2)
         statement.problem.positive("cover", choose @ statement.P @ choose.T - floor)
+
+    def _inside(self, statement: RegionalStatement, decay_rate: float) -> RegionalDesign | None:
+        """As near to the optimum as exact arithmetic confirms; without an objective all are the same."""
+        for back_off in BACK_OFFS:
+            solution = statement.problem.solve_inside(back_off)
+            if solution.verified or not solution.values:
+                break
+        return self._design(statement, solution, decay_rate)
 
     def _design(self, statement: RegionalStatement, solution: Solution, decay_rate: float) -> RegionalDesign | None:
         if not solution.verified:
