@@ -21,7 +21,8 @@ python "$project/tools/lib/environment_size.py" "$project/docs/how-to/install.md
 design --version
 for program in qlpv-controller qlpv-simulator; do "$program" --help >/dev/null; done
 design demo -o demo
-design view --log LAST 2>&1 | grep "pip install 'quasilpv\[view\]'"
+said=$(design view --log LAST 2>&1) && exit 1 # the extra is not there, and a line says so
+[[ $said == *"pip install 'quasilpv[view]'"* ]]
 
 pip install --progress-bar off "${wheel}[hil,view]"
 design hil serial-square -o hil
