@@ -79,6 +79,14 @@ def _text(vertices: Vertices) -> str:
     return ", ".join(f"({x:g}, {y:g})" for x, y in vertices)
 
 
+def _with_twin(name: str, polytopes: Mapping[str, Vertices]) -> str:
+    """A name, and which polytope before it is the same set: their outlines lie on each other."""
+    own = {tuple(vertex) for vertex in polytopes[name]}
+    before = list(polytopes)[: list(polytopes).index(name)]
+    twins = [other for other in before if {tuple(vertex) for vertex in polytopes[other]} == own]
+    return f"{name} = {twins[0]}" if twins else name
+
+
 def _figure(polytopes: Mapping[str, Vertices], circle: Vertices) -> Figure:
     looks = {
         "TS": (BLUE, "--", "s"),
@@ -94,8 +102,9 @@ def _figure(polytopes: Mapping[str, Vertices], circle: Vertices) -> Figure:
         for name, (colour, line, marker) in looks.items():
             vertices = polytopes[name]
             outline = vertices[[*ConvexHull(vertices).vertices, ConvexHull(vertices).vertices[0]]]
+            label = _with_twin(name, polytopes)
             axes.plot(
-                *outline.T, color=colour, linestyle=line, marker=marker, markersize=5.0, label=name, fillstyle="none"
+                *outline.T, color=colour, linestyle=line, marker=marker, markersize=5.0, label=label, fillstyle="none"
             )
         axes.set_xlabel("premise z1 = cos x1 (no unit)")
         axes.set_ylabel("premise z2 = sin x1 (no unit)")
