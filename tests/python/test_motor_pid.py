@@ -241,8 +241,6 @@ def test_when_an_arm_is_of_another_class_expect_motor_pid_refused_by_name() -> N
         synthesise(DesignRequest.of(small_robot(), "motor-pid"))
     with pytest.raises(InputError, match=r"motor-pid for an arm that is elastic, link encoders"):
         synthesise(DesignRequest.of(elastic_ur5(side="link"), "motor-pid"))
-    with pytest.raises(InputError, match=r"lag: .*motor-pid"):
-        synthesise(DesignRequest.of(replace(elastic_ur5(), lag_s=(0.0, 1e-3)), "motor-pid"))
     with pytest.raises(InputError, match=r"one for robots in the plane: "):
         synthesise(DesignRequest.of("arm3", "motor-pid"))
 
@@ -250,8 +248,31 @@ def test_when_an_arm_is_of_another_class_expect_motor_pid_refused_by_name() -> N
 def test_when_elastic_modes_are_beyond_the_reach_of_the_rate_expect_no_design_and_why(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    robot = elastic_ur5(damping_s=0.0)
+    robot = elastic_ur5(damping_s=1e-7)
     monkeypatch.setattr(motor_pid, "POSTURES", 8)
     stiff = [replace(joint, drive=replace(joint.drive, stiffness_nm_rad=(4e5, 4e5))) for joint in robot.joints]  # type: ignore[type-var]
     with pytest.raises(InfeasibleError, match=r"no motor-pid at 1000 Hz: .*damping_least"):
         synthesise(DesignRequest.of(replace(robot, joints=tuple(stiff)), "motor-pid"))
+
+
+def test_when_a_gear_without_damping_rings_above_the_lead_expect_it_refused_with_both_frequencies() -> None:
+    for controller, robot in (
+        ("motor-pid", elastic_ur5(damping_s=0.0)),
+        ("link-damped", elastic_ur5(side="both", damping_s=0.0)),
+    ):
+        with pytest.raises(
+            InputError, match=r"damping_least: got 0, .*rings at up to .* lead of the loop ends at 1047"
+        ):
+            synthesise(DesignRequest.of(robot, controller))
+
+
+@pytest.mark.full
+def test_when_drives_lag_expect_a_proof_for_every_lag() -> None:
+    """Half a minute of cells: frequency, delay and lag."""
+    robot = replace(elastic_ur5(), lag_s=(0.0, 5e-4))
+    artifact = checked_artifact(synthesise(DesignRequest.of(robot, "motor-pid")))
+    assert artifact.verification is not None
+    report = artifact.verification["report"]
+    assert report["evidence"] == "proved"
+    assert list(artifact.payloads["lag_s"]) == [0.0, 5e-4]
+    assert report["highest_mode_rad_s"] > report["lead_window_rad_s"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -26,6 +26,9 @@ from quasilpv.errors import ClaimError, InfeasibleError, InputError
 from quasilpv.files import claim_folder
 from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, DesignRequest, default_controller
 
+if TYPE_CHECKING:
+    from quasilpv.systems.robots.registry import AnyRobot
+
 
 def synth_command(
     robot_id: Annotated[
@@ -41,6 +44,7 @@ def synth_command(
         str | None,
         typer.Option(
             "--design",
+            "--law",
             help=f"Controller: {', '.join(CONTROLLERS)}; for short {' or '.join(SHORT_NAMES)}."
             f"  [default: {DEFAULT_CONTROLLER}; of an arm with elastic joints, by its class]",
         ),
@@ -146,7 +150,7 @@ def synth_command(
     source = robot_named(robot_id)
     chosen = default_controller(source) if controller is None else require_controller(controller)
     if controller is None and chosen != DEFAULT_CONTROLLER:
-        print_note(f"{source.id} is {getattr(source, 'arm_class', 'of a class of its own')}: {chosen}")
+        print_note(_why(source, chosen))
     request = requested(
         source,
         chosen,
@@ -162,6 +166,18 @@ def synth_command(
         print_json(answer)
     else:
         print_released(answer)
+
+
+def _why(robot: AnyRobot, chosen: str) -> str:
+    """Why the law of a class was chosen, and what else there is by name."""
+    from quasilpv.synthesis.elastic.classes import reason_of
+    from quasilpv.systems.robots.spatial_robot import SpatialRobot
+
+    if not isinstance(robot, SpatialRobot):
+        return f"{robot.id}: {chosen}"
+    others = [name for name, kind in CONTROLLERS.items() if robot.arm_class in kind.arm_classes and name != chosen]
+    instead = f"; --law {' or '.join(others)} is there too" if others else ""
+    return f"{robot.id} is {robot.arm_class}, {reason_of(robot)}: {chosen}{instead}"
 
 
 def _refuse(options: Mapping[str, object], name: str, kind: str) -> None:

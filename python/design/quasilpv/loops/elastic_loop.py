@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.linalg import block_diag, expm
@@ -41,7 +42,7 @@ class MotorLaw:
     rotors: FloatArray
     stiffness: FloatArray
     correction_rad_s: float
-    source: str = "motor-torque"
+    source: Literal["motor-torque", "joint-torque", "deflection"] = "motor-torque"
 
     def state_space(self, joint: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         """``x+ = A x + b th``, ``a = c x + d th`` of a joint; what sensors tell of its gear comes on top (`sensed`).

@@ -19,11 +19,12 @@ import numpy as np
 from quasilpv.arrays import FloatArray
 from quasilpv.certificate.laws.link_damped import LinkDampedLaw
 from quasilpv.conditions.tracking.sampled_chains import feedback_gains, observer_gains
-from quasilpv.errors import InfeasibleError, InputError
+from quasilpv.errors import InfeasibleError
 from quasilpv.loops.link_loop import LinkLaw, link_growth_rate
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.tree_law import design_inertia
 from quasilpv.synthesis.elastic.arms import elastic_drives, grid_arms
+from quasilpv.synthesis.elastic.classes import Reach
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
@@ -63,12 +64,11 @@ def link_damped(robot: SpatialRobot, specification: Specification, progress: Pro
         progress: called with (choices tried, choices in all).
 
     Raises:
-        InputError: a joint is rigid, has no encoder on either side, or the drives lag.
+        InputError: a joint is rigid, has encoders on one side only, or rings above the loop's lead undamped.
         InfeasibleError: no choice of gains is stable on the whole grid.
     """
     drives = elastic_drives(robot, "link-damped", ("both",))
-    if robot.lag_s[1] > 0.0:
-        raise InputError(robot.source, "lag", list(robot.lag_s), "0 for link-damped: simulated gears have no lag")
+    reach = Reach.of(robot, specification)
     arms = list(grid_arms(robot, drives, POSTURES))
     inertias = robot.tree.inertia(np.array([arm.posture for arm in arms]))
     stiffness = np.array([sqrt(drive.stiffness_nm_rad[0] * drive.stiffness_nm_rad[1]) for drive in drives])
@@ -83,7 +83,7 @@ def link_damped(robot: SpatialRobot, specification: Specification, progress: Pro
         progress(tried + 1, len(CHOICES))
         rates.append(max(found))
         if rates[-1] < 0.0:
-            grid = {"loops": len(found), "worst_growth_rate_per_s": rates[-1]}
+            grid = {**reach.to_document(), "loops": len(found), "worst_growth_rate_per_s": rates[-1]}
             return _design(robot, specification, (choice, law, stiffness), grid)
     raise InfeasibleError(
         f"{robot.id}: no link-damped at {specification.rate_hz:g} Hz: of {len(CHOICES)} choices of gains the best "

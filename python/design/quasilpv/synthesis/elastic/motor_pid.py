@@ -18,7 +18,6 @@ from math import pi, sqrt
 from typing import Any
 
 import numpy as np
-from flint import fmpq
 
 from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.matrices import rational
@@ -29,12 +28,13 @@ from quasilpv.certificate.laws.motor_pid import MotorPidLaw
 from quasilpv.conditions.tracking.sampled_chains import observer_gains
 from quasilpv.documents.payloads import TreePayloads
 from quasilpv.documents.strict_model import validate
-from quasilpv.errors import InfeasibleError, InputError
+from quasilpv.errors import InfeasibleError
 from quasilpv.loops.elastic_loop import MotorLaw, growth_rate
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.tree_law import design_inertia
 from quasilpv.synthesis.chain_range import find_range
 from quasilpv.synthesis.elastic.arms import elastic_drives, grid_arms, links_of
+from quasilpv.synthesis.elastic.classes import Reach
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.joint_drive import ElasticDrive
@@ -80,29 +80,32 @@ def motor_pid(robot: SpatialRobot, specification: Specification, progress: Progr
         progress: called with (choices tried, choices in all).
 
     Raises:
-        InputError: a joint is rigid, its encoder is on the link only, or the drives lag.
+        InputError: a joint is rigid, its encoder is on the link only, or a gear rings above the loop's lead undamped.
         InfeasibleError: no choice of gains is stable on the whole grid.
     """
     drives = elastic_drives(robot, "motor-pid", ("motor", "both"))
-    if robot.lag_s[1] > 0.0:
-        expected = "0 for motor-pid: its loops on the grid have no lag of the motors' currents"
-        raise InputError(robot.source, "lag", list(robot.lag_s), expected)
+    reach = Reach.of(robot, specification)
     period = specification.sample_period_s
     source, correction = _correction(drives)
     choices = [replace(choice, correction=correction) for choice in CHOICES]
     laws = {choice: _law(robot, drives, choice, period, source) for choice in choices}
     witness = _links_witness(robot, specification)
-    for choice, law in laws.items():
-        if witness is not None and _excluded(robot, law, witness, specification).proved:
+    given_up = []
+    for choice, law in laws.items() if witness is not None else ():
+        found = _excluded(robot, law, witness or {}, specification)
+        if found.proved:
             grid = _grid(robot, drives, law, specification.delay_s, BESIDE_A_PROOF)
-            return _design(robot, specification, (choice, law), {"evidence": "proved", **grid}, witness)
+            report = {"evidence": "proved", **reach.to_document(), **grid}
+            return _design(robot, specification, (choice, law), report, witness)
+        given_up.append(found.given_up_rad_s)
     rates = []
     for tried, (choice, law) in enumerate(laws.items()):
         grid = _grid(robot, drives, law, specification.delay_s, POSTURES)
         progress(tried + 1, len(CHOICES))
         rates.append(float(grid["worst_growth_rate_per_s"]))
         if rates[-1] < 0.0:
-            return _design(robot, specification, (choice, law), {"evidence": "gridded", **grid}, None)
+            report = {"evidence": "gridded", "not_excluded_at_rad_s": given_up, **reach.to_document(), **grid}
+            return _design(robot, specification, (choice, law), report, None)
     raise InfeasibleError(
         f"{robot.id}: no motor-pid at {specification.rate_hz:g} Hz: of {len(CHOICES)} choices of gains the best grows "
         f"by {min(rates):.3g} 1/s in a posture of the grid: its elastic modes are beyond the reach of this sample "
@@ -137,7 +140,6 @@ def _links_witness(robot: SpatialRobot, specification: Specification) -> dict[st
 
 def _excluded(robot: SpatialRobot, law: MotorLaw, witness: dict[str, Any], specification: Specification) -> Exclusion:
     """What the exclusion will say of these gains, if the bounds of the links are what they seem."""
-    source, _ = _correction(elastic_drives(robot, "motor-pid", ("motor", "both")))
     loop = MotorLoopData(
         sample_period_s=law.sample_period_s,
         feedback=_numbers(law.feedback),
@@ -145,14 +147,14 @@ def _excluded(robot: SpatialRobot, law: MotorLaw, witness: dict[str, Any], speci
         correction_rad_s=law.correction_rad_s,
         rotors=_numbers(law.rotors),
         stiffness=_numbers(law.stiffness),
-        source=source,
+        source=law.source,
     )
     payloads = validate(TreePayloads, robot.payloads.to_document(), robot.source)
     chain = witness["chain"]
     links = rational(chain["lowest"]["bound"]), rational(chain["highest"]["bound"])
     delay = rational(specification.delay_samples)
-    none = (fmpq(0), fmpq(0))
-    plants = elastic_set(loop, links, payloads, delay, none)
+    shortest, longest = (rational(end) / loop.period for end in robot.lag_s)
+    plants = elastic_set(loop, links, payloads, delay, (shortest, longest))
     return TwoMassExclusion(loop, plants).decide()
 
 
