@@ -1,6 +1,7 @@
 """`motor-pid`, the law for arms with elastic joints: sample by sample, its loops, its design, and what is refused."""
 
 import math
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
+from quasilpv.cli.synth import _why
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.experiments.designs import shipped_design
@@ -276,3 +278,13 @@ def test_when_drives_lag_expect_a_proof_for_every_lag() -> None:
     assert report["evidence"] == "proved"
     assert list(artifact.payloads["lag_s"]) == [0.0, 5e-4]
     assert report["highest_mode_rad_s"] > report["lead_window_rad_s"]
+
+
+def test_when_the_law_of_a_class_is_chosen_expect_why_and_what_else_there_is() -> None:
+    said = _why(elastic_ur5(side="both"), default_controller(elastic_ur5(side="both")))
+    assert re.fullmatch(
+        r"ur5-elastic is elastic, dual encoders, above \d+ rad/s the motor of \w+ feels its rotor alone, "
+        r"1/[\d.]+ of the arm's inertia: motor-pid; --law link-damped is there too",
+        said,
+    )
+    assert "--law" not in _why(elastic_ur5(), "motor-pid")
