@@ -80,12 +80,13 @@ def test_when_the_law_steps_expect_the_recursion(source: str) -> None:
         torque = B * a + fed + friction
         scale = max(1.0, float(np.abs(torque).max()))
         np.testing.assert_allclose(report.torque_applied[:4], torque, rtol=0, atol=1e-12 * scale)
-        left_alone += int((np.abs(y - motor) <= LAW["dead_zone_rad"]).sum())
-        e_I = e_I + T * np.where(np.abs(y - motor) > LAW["dead_zone_rad"], y - motor, 0.0)
+        away = np.abs(y - motor) > LAW["dead_zone_rad"]
+        left_alone += int((~away).sum())
+        e_I = e_I + T * np.where(away, y - motor, 0.0)
         unforeseen = wound - fed / K if source != "motor-torque" else (torque - fed - friction - B * rdd) / K
         if told or source == "motor-torque":
-            c1 = c1 + share * (unforeseen - c1)
-            c2 = c2 + share * (c1 - c2)
+            c1 = c1 + share * np.where(away, unforeseen - c1, 0.0)
+            c2 = c2 + share * np.where(away, c1 - c2, 0.0)
         applied = a + d
         th = th + T * w + T**2 / 2.0 * applied + T**3 / 6.0 * j
         w, d = w + T * applied + T**2 / 2.0 * j, d + T * j

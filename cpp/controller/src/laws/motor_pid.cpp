@@ -32,7 +32,7 @@ struct MotorPidParameters final : ObserverParameters {
   CorrectionSource correction_source = CorrectionSource::kMotorTorque;
   JointArray viscous{};    ///< of the motors, N m s/rad, as far as it is known
   JointArray coulomb{};    ///< likewise, N m
-  double dead_zone = 0.0;  ///< of the integral: errors up to this are not integrated, rad
+  double dead_zone = 0.0;  ///< of integral and correction: errors up to this are left alone, rad
 
   AngleSide controlled_side() const noexcept override { return AngleSide::kMotor; }
   std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
@@ -45,8 +45,10 @@ struct MotorPidParameters final : ObserverParameters {
 ///     x_hat += [l1, l2, l3, l4] (y - th)                                                current estimator
 ///     a_cmd  = r'' + kp (th - r_m) + kd (w - r') + ki e_I
 ///     Gamma  = B a_cmd + tau_r + f r' + c tanh(r' / w_0), limited                       f, c: friction of the motors
-///     e_I   += T (y - r_m) outside the dead zone                  anti-windup: see integrate_error()
+///     where |y - r_m| is beyond the dead zone, joint by joint, or there is none:
+///     e_I   += T (y - r_m)                                        anti-windup: see integrate_error()
 ///     c_1   += (1 - p) (u - c_1);  c_2 += (1 - p) (c_1 - c_2),                      p = exp(-w_c T)
+///     everywhere:
 ///     a_app  = B^-1 (Gamma_applied - fed forward) + a_d,  then as in DobAccelerationLaw
 ///
 /// What the spring is wound beside what was foreseen is u: from the motor's torque K^-1 (Gamma_applied - fed forward -
@@ -70,6 +72,13 @@ class MotorPidLaw final : public ObserverLaw<N> {
 
  private:
   using typename ObserverLaw<N>::Motion;
+  using Away = Eigen::Array<bool, N, 1>;
+
+  /// Which motors are farther from their reference than the dead zone; all, without one.
+  Away away(const ModelSample<N>& model, const ReferenceVectors<N>& reference) const noexcept {
+    return (model.angle - reference.angle).array().abs() > parameters_.dead_zone ||
+           Away::Constant(parameters_.dead_zone == 0.0);
+  }
 
   void sense(const StepInput& input) noexcept override {
     sensed_ = input.valid;
@@ -112,26 +121,27 @@ class MotorPidLaw final : public ObserverLaw<N> {
         reference.acceleration + parameters_.feedback.kp * (state.angle - reference.angle) +
         parameters_.feedback.kd * (state.speed - reference.speed) + parameters_.feedback.ki * state.integral_error;
     // A joint without a gain is not integrated: a motor that sticks is left alone where it is near enough.
-    const JointVector<N> gain = ((model.angle - reference.angle).array().abs() > parameters_.dead_zone)
-                                    .select(JointVector<N>::Constant(parameters_.feedback.ki), 0.0);
+    const JointVector<N> gain = away(model, reference).select(JointVector<N>::Constant(parameters_.feedback.ki), 0.0);
     return {rotor_.cwiseProduct(acceleration) + fed_forward_, gain};
   }
 
-  Motion predict(const ObserverState<N>& state, const ModelSample<N>& /*model*/, const ReferenceVectors<N>& reference,
+  Motion predict(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& reference,
                  StepReport& report) noexcept override {
     const JointVector<N> torque = from_array<N>(report.torque_applied);
     if (parameters_.correction_source == CorrectionSource::kMotorTorque) {
       const JointVector<N> inertial = rotor_.cwiseProduct(reference.acceleration);
-      follow((torque - fed_forward_ - inertial).cwiseQuotient(stiffness_));
+      follow((torque - fed_forward_ - inertial).cwiseQuotient(stiffness_), away(model, reference));
     } else if (sensed_) {
-      follow(wound_ - foreseen_);
+      follow(wound_ - foreseen_, away(model, reference));
     }
     return {(torque - fed_forward_).cwiseQuotient(rotor_) + state.disturbance, state.disturbance_rate};
   }
 
-  void follow(const JointVector<N>& unforeseen) noexcept {
-    lagging_ += (1.0 - correction_pole_) * (unforeseen - lagging_);
-    correction_ += (1.0 - correction_pole_) * (lagging_ - correction_);
+  /// Of motors that are away: otherwise it drags the reference out from under a motor that sticks.
+  void follow(const JointVector<N>& unforeseen, const Away& away) noexcept {
+    const JointVector<N> share = away.select(JointVector<N>::Constant(1.0 - correction_pole_), 0.0);
+    lagging_ += share.cwiseProduct(unforeseen - lagging_);
+    correction_ += share.cwiseProduct(lagging_ - correction_);
   }
 
   MotorPidParameters parameters_;

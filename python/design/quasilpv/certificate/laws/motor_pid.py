@@ -38,7 +38,7 @@ class MotorPidLaw(ChainLaw):
         correction_source: what tells how far the gears are wound: the motors' torques, sensors of the joints' torques,
             or encoders on both sides.
         friction_viscous_nm_s, friction_coulomb_nm: of the motors, fed forward.
-        dead_zone_rad: errors up to this are not integrated, so that a motor that sticks does not hunt.
+        dead_zone_rad: errors up to this are neither integrated nor corrected: a motor that sticks does not hunt.
     """
 
     inertia: DesignInertia
