@@ -49,6 +49,8 @@ class StabiliseOptions(TypedDict, total=False):
     rate_hz: float
     speed: float
     share: float
+    disturbance: Mapping[str, float]
+    performance: Mapping[str, float]
     parameters: Mapping[str, float]
     allow_unproved_rate: bool
 
@@ -184,9 +186,9 @@ def stabilise(system: SystemLike, **options: Unpack[StabiliseOptions]) -> System
 
     Args:
         system: a `DescriptorSystem`, a function of parameters that makes one, or a reference as on the command line.
-        **options: ``objective`` (``largest-region``, ``fastest``, ``least-gain``), ``decay_rate`` (1/s),
-            ``input_limits`` by name, ``rate_hz``, ``speed`` (1/s), ``share``; ``parameters`` of the function;
-            ``allow_unproved_rate``.
+        **options: ``objective`` (``largest-region``, ``fastest``, ``least-gain``, ``least-l2-gain``),
+            ``decay_rate`` (1/s), ``input_limits`` by name, ``rate_hz``, ``speed`` (1/s), ``share``, ``disturbance`` and
+            ``performance`` by name; ``parameters`` of the function; ``allow_unproved_rate``.
 
     Raises:
         InputError: something does not exist or does not fit.

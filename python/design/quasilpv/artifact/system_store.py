@@ -74,6 +74,7 @@ def system_summary(artifact: SystemArtifactDocument) -> dict[str, Any]:
             "residual": len(artifact.plant.residual.code),
             "jacobian": sum(len(row.code) for row in artifact.plant.jacobian),
         },
+        **({} if artifact.l2_gain is None else {"l2_gain": artifact.l2_gain[0], "energy_s": artifact.l2_gain[1]}),
         "sampling": artifact.sampling or "not proved",
         "verification": artifact.verification,
     }

@@ -62,7 +62,8 @@ def synth_command(
     objective: Annotated[
         str | None,
         typer.Option(
-            "--objective", help="Of a system: largest-region, fastest or least-gain.  [default: largest-region]"
+            "--objective",
+            help="Of a system: largest-region, fastest, least-gain or least-l2-gain.  [default: largest-region]",
         ),
     ] = None,
     decay: Annotated[
@@ -82,7 +83,23 @@ def synth_command(
     share: Annotated[
         float | None,
         typer.Option(
-            "--share", help="Of a system: part of the domain that fastest and least-gain cover.  [default: 0.5]"
+            "--share", help="Of a system: part of the domain that all but largest-region cover.  [default: 0.5]"
+        ),
+    ] = None,
+    disturbance: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--disturbance",
+            metavar="NAME=SIZE",
+            help="For least-l2-gain: the input, or the state to whose rate, a disturbance of this size is added.",
+        ),
+    ] = None,
+    performance: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--performance",
+            metavar="NAME=SIZE",
+            help="For least-l2-gain: a state or an input, and which deviation of it counts as 1.",
         ),
     ] = None,
     set_: SetOption = None,
@@ -114,6 +131,8 @@ def synth_command(
         "--input-limit": input_limit,
         "--speed": speed,
         "--share": share,
+        "--disturbance": disturbance,
+        "--performance": performance,
         "--set": set_,
         "--allow-unproved-rate": allow_unproved_rate or None,
     }
@@ -133,6 +152,8 @@ def synth_command(
             "rate_hz": rate_hz,
             "speed": speed,
             "share": share,
+            "disturbance": numbers_by_name("--disturbance", disturbance) or None,
+            "performance": numbers_by_name("--performance", performance) or None,
         }
         made = write_system(
             robot_id,

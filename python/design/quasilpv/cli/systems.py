@@ -79,6 +79,7 @@ def print_system(answer: Mapping[str, Any]) -> None:
         ("region reaches", reach),
         ("decay rate", f"{answer['decay_rate_per_s']:.4g} 1/s"),
         ("largest gain", f"{answer['largest_gain']:.4g}"),
+        *_performance(answer),
         *((f"input {name}", text) for name, text in answer["inputs"].items()),
         *((f"assumed of {name}", text) for name, text in answer["parameters"].items()),
         *(("assumed", text) for text in answer["verification"]["assumed"]),
@@ -88,3 +89,10 @@ def print_system(answer: Mapping[str, Any]) -> None:
     print_table(answer["name"], ("", ""), rows, left_columns=2)
     for path in answer["artifact"].values():
         print_note(f"wrote {path}")
+
+
+def _performance(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
+    if "l2_gain" not in answer:
+        return []
+    energy = f"{answer['energy_s']:.4g} s"
+    return [("L2 gain", f"{answer['l2_gain']:.4g} before sampling, of disturbances of energy up to {energy} from rest")]

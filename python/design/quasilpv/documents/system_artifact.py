@@ -22,6 +22,12 @@ SCHEMA = "quasilpv.system_artifact"
 MAX_STATES = 32
 MAX_INPUTS = 7
 
+DISTURBANCE, PERFORMANCE, L2_GAIN = "disturbance", "performance", "l2 gain"
+"""Members of the witness of a design for an L2 gain: sizes of every state and input that count as 1, and the gain."""
+
+BALANCE = "balance"
+"""Factor of the sizes in the inequality of the gain."""
+
 Rows = tuple[tuple[float, ...], ...]
 Role = Literal["state", "input", "parameter"]
 
@@ -145,6 +151,14 @@ class SystemArtifactDocument(StrictModel):
     def parameters(self) -> tuple[Signal, ...]:
         """Its parameters."""
         return self.of("parameter")
+
+    @property
+    def l2_gain(self) -> tuple[float, float] | None:
+        """The gain, and the energy of a disturbance from rest (its square, integrated, s) within the region."""
+        if L2_GAIN not in self.witness:
+            return None
+        [[gain]], [[balance]], time = self.witness[L2_GAIN], self.witness[BALANCE], self.witness["units"][3][0]
+        return gain, balance**2 * time / gain
 
     @property
     def hash(self) -> str:

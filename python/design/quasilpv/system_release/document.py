@@ -16,7 +16,7 @@ from quasilpv.artifact.plant_program import plant_document
 from quasilpv.documents.canonical import document_hash
 from quasilpv.documents.programs import Program
 from quasilpv.documents.strict_model import validate
-from quasilpv.documents.system_artifact import SCHEMA, SystemArtifactDocument
+from quasilpv.documents.system_artifact import DISTURBANCE, PERFORMANCE, SCHEMA, SystemArtifactDocument
 from quasilpv.synthesis.regional.feedback import RegionalDesign
 from quasilpv.synthesis.regional.request import RegionalRequest
 from quasilpv.systems.descriptor.premise import AffineMatrix, PremiseKind
@@ -46,6 +46,7 @@ def artifact_of(
         for p, premise in enumerate(system.premises)
     ]
     units = design.units
+    performance = {DISTURBANCE: request.disturbance, PERFORMANCE: request.performance}
     document = {
         "schema": SCHEMA,
         "schema_version": 1,
@@ -76,6 +77,7 @@ def artifact_of(
         "witness": {
             "units": [units.T.tolist(), units.S.tolist(), units.D.tolist(), [units.c]],
             **{name: value.tolist() for name, value in design.witness.items()},
+            **{name: [list(request.sizes(own))] for name, own in performance.items() if own},
         },
         "sampling": sampling,
         "verification": verification,
@@ -144,4 +146,6 @@ def _inputs(request: RegionalRequest) -> dict[str, Any]:
         "rate_hz": request.rate_hz,
         "speed": request.speed,
         "share": request.share,
+        **({"disturbance": dict(request.disturbance)} if request.disturbance else {}),
+        **({"performance": dict(request.performance)} if request.performance else {}),
     }

@@ -7,6 +7,7 @@ With the shipped gains K_j and the shipped P (`quasilpv.documents.system_artifac
   equations can be solved for their states.
 * **states, inputs, algebraic states, speed**: at the vertices, the inequalities that keep ``V <= 1`` inside the domain
   and the limits.
+* **L2 gain**, if the design is for one: ``V' + z'z/g - g w'w < 0``, without the sampling.
 * **premise box**: the premises stay in the box over which all this was decided while the differential states are in the
   region, the algebraic ones in their domain and the parameters in their intervals, in ball arithmetic.
 * **plant**: the residual that is simulated is ``E(z) x' - A(z) x - B(z) u`` at random points (sampled).
@@ -33,7 +34,15 @@ from quasilpv.certificate.exact.program_ranges import outputs_of, range_claim
 from quasilpv.certificate.exact.program_values import program_values
 from quasilpv.certificate.exact.vertex_tables import VertexTable
 from quasilpv.documents.strict_model import FieldError
-from quasilpv.documents.system_artifact import AffineDocument, Signal, SystemArtifactDocument
+from quasilpv.documents.system_artifact import (
+    BALANCE,
+    DISTURBANCE,
+    L2_GAIN,
+    PERFORMANCE,
+    AffineDocument,
+    Signal,
+    SystemArtifactDocument,
+)
 
 UNITS = "units"
 POINTS = 64
@@ -54,6 +63,8 @@ def regional_claims(artifact: SystemArtifactDocument) -> Iterator[Claim]:
     yield from own.inputs()
     if artifact.region.speed_per_s is not None:
         yield from own.speed(rational(artifact.region.speed_per_s))
+    if L2_GAIN in artifact.witness:
+        yield from own.l2_gain()
     yield from own.premises()
     yield from VertexTable.of(artifact.law.gain).collapse_claim("gain")
     yield plant_claim(artifact)
@@ -277,6 +288,48 @@ class _Claims:
 
         yield from self._negative("speed", "speed of the closed loop", entry, 3 * q + a)
 
+    def l2_gain(self) -> Iterator[Claim]:
+        """``int z'z < g^2 int w'w`` from rest: w is added to inputs and rates, z are states and inputs, in sizes."""
+        q, n, P = self.q, self.n, self.P
+        W, Z = self.witness("W", n, q), self.witness("Z", n, n)
+        g, balance = (self.witness(name, 1, 1)[0, 0] for name in (L2_GAIN, BALANCE))
+        factors = [*self.units.states, *self.units.inputs]
+        m = len(self.artifact.inputs)
+        sizes = [balance * self.witness(name, 1, n + m) for name in (DISTURBANCE, PERFORMANCE)]
+        added, output = (row.table()[0] for row in sizes)
+        w, z = ([k for k in range(n + m) if row[k] > 0] for row in (added, output))
+        if not w or not z or any(q <= k < n for k in w):
+            raise FieldError("witness.disturbance", len(w), "one of an input or a differential state, and performance")
+
+        def entry(i: int, j: int) -> fmpq_mat:
+            A, M = self.A[i], self.M[j]
+            lower = _columns(A, 0, q) * P + _extended(self.E[i], A, q) * stack([[W]]) + self.B[i] * M
+            top = he(stack([[_rows(W, 0, q), _rows(Z, 0, q)], [lower, _extended(self.E[i], A, q) * Z]]))
+            both = [self.E[i] * self.c if k < n else self.B[i] for k in w]
+            shares = [added[k] / factors[k] for k in w]
+            columns = [
+                _columns(X, k % n if k < n else k - n, (k if k < n else k - n) + 1)
+                for X, k in zip(both, w, strict=True)
+            ]
+            rows = [[fmpq(0)] * q + [s * col[r, 0] for r in range(n)] for s, col in zip(shares, columns, strict=True)]
+            extended = [self._state_row(k, W, Z) if k < n else _wide(_rows(M, k - n, k - n + 1), n) for k in z]
+            seen = [[factors[k] / output[k] * entry for entry in row] for k, row in zip(z, extended, strict=True)]
+            return symmetric(
+                [
+                    [top, matrix(rows).transpose(), matrix(seen).transpose()],
+                    [None, -g * diagonal([fmpq(1)] * len(w)), zero(len(w), len(z))],
+                    [None, None, -g * diagonal([fmpq(1)] * len(z))],
+                ]
+            )
+
+        yield from self._negative("l2", f"L2 gain {float(g.p) / float(g.q):.4g}", entry, q + n + len(w) + len(z))
+
+    def _state_row(self, k: int, W: fmpq_mat, Z: fmpq_mat) -> list[fmpq]:
+        """The row of ``P_e`` of a state: x_d = [P 0] xi, x_a = the last rows of [W Z] xi."""
+        if k < self.q:
+            return [*self.P.table()[k], *[fmpq(0)] * self.n]
+        return [*W.table()[k], *Z.table()[k]]
+
     def _single(self, slack: str, title: str, entry: Callable[[int, int], fmpq_mat], size: int) -> Iterator[Claim]:
         blocks = [b for b, block in enumerate(self.table.blocks) for _ in range(2 ** len(block))]
         groups = len(self.table.blocks)
@@ -349,6 +402,10 @@ def _extended(E: fmpq_mat, A: fmpq_mat, q: int) -> fmpq_mat:
     n = E.nrows()
     left = -_columns(E, 0, q)
     return left if q == n else stack([[left, _columns(A, q, n)]])
+
+
+def _wide(row: fmpq_mat, n: int) -> list[fmpq]:
+    return [*row.table()[0], *[fmpq(0)] * n]
 
 
 def _rows(full: fmpq_mat, start: int, stop: int) -> fmpq_mat:

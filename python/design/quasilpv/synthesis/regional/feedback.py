@@ -21,8 +21,11 @@ from quasilpv.conditions.regional.feedback import (
     regional_statement,
     require_inputs,
 )
+from quasilpv.conditions.regional.performance import require_l2_gain
 from quasilpv.conditions.regional.volume import geometric_mean_of_eigenvalues
 from quasilpv.conditions.reliance import COMPENSATION, Reliance, Status, refuse_refuted, reliances
+from quasilpv.documents.system_artifact import BALANCE as BALANCE_MEMBER
+from quasilpv.documents.system_artifact import L2_GAIN
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.lmi import Solution, Variable
 from quasilpv.polytopes import PolytopicModel, polytopic_model
@@ -34,6 +37,16 @@ from quasilpv.systems.descriptor.system import DescriptorSystem
 
 BACK_OFFS = (0.001, 0.02)
 """Of the optimum, given up for room in which exact arithmetic can confirm the inequalities; the next if one fails."""
+
+L2_BACK_OFF = 0.1
+"""The same of the L2 gain: nearer to the optimum the gains of the feedback grow without bound."""
+
+BALANCE = 4.0
+"""By so much the sizes of disturbance and performance grow or shrink together, which changes no gain but the bound of
+it: V is at most 1 in the region, and what V' has to outweigh is measured in it."""
+
+MOST_BALANCES = 5
+"""So many steps at most."""
 
 DEFAULT_DECAY = 0.1
 """Decay rate if none is asked for, in units of the time in which the system moves by as much as it is."""
@@ -107,7 +120,7 @@ def design_feedback(
     found: list[RegionalDesign] = []
     for units in islice(_units(request), most_units):
         search = _Search(request, model, units)
-        design = search.fastest(progress) if request.objective == "fastest" else search.best()
+        design = search.found(progress)
         if design is not None:
             found.append(design)
             break
@@ -160,6 +173,10 @@ def _row_exponents(system: DescriptorSystem, state: tuple[int, ...], time: int) 
     return tuple(int(-np.round(np.log2(size))) if size > 0.0 else 0 for size in largest)
 
 
+def _gain(design: RegionalDesign | None) -> float:
+    return inf if design is None else float(design.witness[L2_GAIN][0, 0])
+
+
 @dataclass(frozen=True)
 class _Search:
     """A request in units."""
@@ -184,8 +201,14 @@ class _Search:
         asked = self.request.decay_rate
         return (default_decay_rate(self.request.system) if asked is None else asked) * self.units.c
 
+    def found(self, progress: Progress) -> RegionalDesign | None:
+        """By the objective."""
+        if self.request.objective == "fastest":
+            return self.fastest(progress)
+        return self.least_l2_gain() if self.request.objective == "least-l2-gain" else self.best()
+
     def best(self) -> RegionalDesign | None:
-        """Largest region, or least gain."""
+        """Largest region, or the least of a gain."""
         limits = self.limits(self.decay_rate)
         if self.request.objective == "least-gain":
             limits = replace(limits, inputs=(inf,) * len(limits.inputs))
@@ -198,6 +221,28 @@ class _Search:
         else:
             statement.problem.minimise(-geometric_mean_of_eigenvalues(statement.problem, statement.P))
         return self._inside(statement, self.decay_rate)
+
+    def least_l2_gain(self) -> RegionalDesign | None:
+        """Over the balance of V and the sizes: larger and smaller by factors, as long as that helps."""
+        found = {0: self._balanced(0)}
+        for direction in (1, -1):
+            step = direction
+            while abs(step) <= MOST_BALANCES:
+                found[step] = self._balanced(step)
+                if _gain(found[step]) >= _gain(found[step - direction]):
+                    break
+                step += direction
+        return min(found.values(), key=_gain)
+
+    def _balanced(self, step: int) -> RegionalDesign | None:
+        balance = BALANCE**step
+        statement = self._statement(self.limits(self.decay_rate))
+        self._cover(statement)
+        gain = Variable(L2_GAIN, 1)
+        require_l2_gain(statement, self._rescaled, *self._performance(balance), gain)
+        statement.problem.minimise(gain)
+        found = self._inside(statement, self.decay_rate)
+        return found and replace(found, witness={**found.witness, BALANCE_MEMBER: np.array([[balance]])})
 
     def fastest(self, progress: Progress) -> RegionalDesign | None:
         """By bisection: the inequalities are not linear in the decay rate."""
@@ -233,9 +278,21 @@ class _Search:
         floor = np.diag((self.request.share * bounds[bounded]) ** 2)
         statement.problem.positive("cover", choose @ statement.P @ choose.T - floor)
 
+    def _performance(self, balance: float) -> tuple[list[float], list[float]]:
+        """Factors of disturbance and performance in the units, for sizes that are so many times larger."""
+        units, request = self.units, self.request
+        factors = [*units.T, *units.S]
+        rates = [units.c] * len(units.T) + [1.0] * len(units.S)
+        disturbance = zip(request.sizes(request.disturbance), rates, factors, strict=True)
+        output = zip(request.sizes(request.performance), factors, strict=True)
+        return (
+            [size * balance * c / t for size, c, t in disturbance],
+            [t / (size * balance) if size else 0.0 for size, t in output],
+        )
+
     def _inside(self, statement: RegionalStatement, decay_rate: float) -> RegionalDesign | None:
         """As near to the optimum as exact arithmetic confirms; without an objective all are the same."""
-        for back_off in BACK_OFFS:
+        for back_off in (L2_BACK_OFF,) if self.request.objective == "least-l2-gain" else BACK_OFFS:
             solution = statement.problem.solve_inside(back_off)
             if solution.verified or not solution.values:
                 break

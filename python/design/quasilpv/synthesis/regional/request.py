@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias, get_args
 from quasilpv.errors import InputError, one_of
 from quasilpv.systems.descriptor.system import DescriptorSystem
 
-Objective: TypeAlias = Literal["largest-region", "fastest", "least-gain"]
+Objective: TypeAlias = Literal["largest-region", "fastest", "least-gain", "least-l2-gain"]
 
 DEFAULT_RATE_HZ = 1000.0
 DEFAULT_SHARE = 0.5
@@ -24,12 +24,16 @@ class RegionalRequest:
     Attributes:
         system: in deviations from its trim.
         objective: what is best: ``largest-region`` (the largest ellipsoid in which everything holds), ``fastest`` (the
-            largest decay rate), ``least-gain`` (the smallest input used in the region).
+            largest decay rate), ``least-gain`` (the smallest input used in the region), ``least-l2-gain`` (the least
+            gain from disturbance to performance).
         decay_rate: alpha with ``V' <= -2 alpha V``, 1/s; not of ``fastest``.
         input_limits: by name, the largest magnitude of an input's deviation from its trim.
         rate_hz: of the sampled loop; None: `DEFAULT_RATE_HZ`, or faster if only that is proved.
         speed: bound of the closed loop in the norm of the region, 1/s; None: whatever results.
-        share: of the half-widths of the domain that the region has to cover, for ``fastest`` and ``least-gain``.
+        share: of the half-widths of the domain that the region has to cover, but for ``largest-region``.
+        disturbance: by name of an input, to which it is added, or of a differential state, to whose rate it is added:
+            the size that counts as 1.
+        performance: by name of a state or an input, the deviation that counts as 1.
 
     Raises:
         InputError: a number is out of range or a name is unknown.
@@ -42,6 +46,8 @@ class RegionalRequest:
     rate_hz: float | None = None
     speed: float | None = None
     share: float = DEFAULT_SHARE
+    disturbance: Mapping[str, float] = field(default_factory=dict)
+    performance: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse what has no meaning."""
@@ -65,6 +71,30 @@ class RegionalRequest:
             raise InputError(source, "input limit", "none", "one, in units of which least-gain measures the input")
         if self.objective == "fastest" and self.decay_rate is not None:
             raise InputError(source, "decay", self.decay_rate, "none: fastest finds it")
+
+        self._check_performance()
+
+    def _check_performance(self) -> None:
+        source, needs = self.system.name, self.objective == "least-l2-gain"
+        names = [symbol.name for symbol in self.system.state]
+        known = {
+            "disturbance": [*names[: self.system.differential], *self.system.inputs],
+            "performance": [*names, *self.system.inputs],
+        }
+        for member, allowed in known.items():
+            given: Mapping[str, float] = getattr(self, member)
+            if bool(given) != needs:
+                expected = "at least one, NAME=SIZE" if needs else "none: only least-l2-gain has one"
+                raise InputError(source, member, ", ".join(given) or "none", expected)
+            for name, size in given.items():
+                if name not in allowed:
+                    raise InputError(source, member, name, one_of(allowed, name))
+                if not (isfinite(size) and size > 0.0):
+                    raise InputError(source, f"{member} {name}", size, "a finite number > 0")
+
+    def sizes(self, named: Mapping[str, float]) -> tuple[float, ...]:
+        """Of every state and input, the size under its name; 0 if there is none."""
+        return tuple(named.get(name, 0.0) for name in [*(s.name for s in self.system.state), *self.system.inputs])
 
     @property
     def sample_period_s(self) -> float:
