@@ -91,6 +91,13 @@ def test_a_package_of_an_extra_that_is_missing_is_named_with_the_extra() -> None
     assert missing_extra(ModuleNotFoundError("No module named 'numpy'", name="numpy")) is None
 
 
+def test_the_extension_links_neither_lcm_nor_libsodium() -> None:
+    dynamic = run("readelf", "--dynamic", "--wide", _runtime.__file__, cwd=ROOT)
+    libraries = set(re.findall(r"\(NEEDED\).*\[lib([a-z_]+)", dynamic))
+    assert "stdc" in libraries
+    assert libraries.isdisjoint({"lcm", "sodium", "glib"})
+
+
 # ---- the wheel -------------------------------------------------------------------------------------------------------
 
 
