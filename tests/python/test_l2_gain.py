@@ -139,7 +139,7 @@ def test_the_command_prints_gain_and_energy(
         "--input-limit",
         "u=20",
     ]
-    assert run(["synth", "mine.py:plant", *options, "--input-limit", "u=20", "-o", "out", "--json"]) == 0
+    assert run(["synth", "mine.py:plant", *options, "-o", "out", "--json"]) == 0
     made = json.loads(capsys.readouterr().out)
     assert made["l2_gain"] > 0.0
     assert made["energy_s"] > 0.0
