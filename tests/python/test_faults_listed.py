@@ -62,3 +62,10 @@ def test_every_claim_about_the_control_thread_names_a_test_that_exists() -> None
 def test_every_fault_of_a_process_is_tested_with_the_real_processes(number: int) -> None:
     files = {path for name, path in PYTHON_TESTS.items() if number_of(name) == number}
     assert any("two_processes" in path.read_text(encoding="utf-8") for path in files)
+
+
+def test_every_claim_about_general_systems_names_tests_that_exist() -> None:
+    section = PAGE.partition("## General systems")[2].partition("\n## ")[0]
+    named = set(re.findall(r"`(\w+_\w+_\w+)`", section))
+    assert len(named) == 7
+    assert named <= CPP_TESTS.keys() | PYTHON_TESTS.keys()

@@ -21,6 +21,7 @@ from quasilpv.cli.options import (
 from quasilpv.cli.pacing import Pacing, counters_of, print_latencies
 from quasilpv.cli.system_hil import run_system
 from quasilpv.cli.system_options import (
+    ARTIFACT_SUFFIXES,
     DelayOption,
     DurationOption,
     NoiseOption,
@@ -30,6 +31,7 @@ from quasilpv.cli.system_options import (
     SeedOption,
     StartOption,
     SystemOptions,
+    refuse,
 )
 from quasilpv.defaults import ENCODER_BITS, WATCHDOG_S
 from quasilpv.errors import FaultStop, InputError
@@ -42,7 +44,6 @@ if TYPE_CHECKING:
     from quasilpv.experiments.result import TrackResult, Variant
     from quasilpv.scenarios import TrackingExperiment
 
-ARTIFACT_SUFFIXES = (".json", ".cbor")
 WATCHDOG_DEFAULT = f"[default: {WATCHDOG_S:g}; of systems at least three samples]"
 
 
@@ -123,11 +124,9 @@ def hil_command(
             "--encoder-bits": encoder_bits,
             "--plant": plant,
         }
-        _refuse(
-            [name for name, value in robots.items() if value is not None], "nothing beside the artifact of a system"
-        )
+        refuse([name for name, value in robots.items() if value is not None], "nothing beside the artifact of a system")
         return run_system(Path(scenario), own, pace, out=out, log=log, json=json)
-    _refuse(own.given(), "nothing beside a scenario of a robot")
+    refuse(own.given(), "nothing beside a scenario of a robot")
     _run_robot(
         scenario,
         Asked(controller or DEFAULT_CONTROLLER, artifact, rate_hz, encoder_bits, plant or "perturbed"),
@@ -137,11 +136,6 @@ def hil_command(
         json=json,
     )
     return 0
-
-
-def _refuse(options: list[str], expected: str) -> None:
-    for name in options:
-        raise InputError("command line", name, "a value", expected)
 
 
 @dataclass(frozen=True)

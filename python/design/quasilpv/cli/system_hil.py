@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quasilpv.cli.console import print_json, print_note, print_table, progress
 from quasilpv.cli.pacing import Pacing, counters_of, print_latencies
-from quasilpv.cli.system_options import SystemOptions, artifact_of_system, code_of, notes_of, rows_of
+from quasilpv.cli.system_options import SystemOptions, artifact_of_system, code_of, folder_name, notes_of, rows_of
 from quasilpv.errors import FaultStop
 
 if TYPE_CHECKING:
@@ -34,7 +33,7 @@ def run_system(path: Path, options: SystemOptions, pace: Pacing, *, out: Path, l
 
     artifact = artifact_of_system(path, "design hil SCENARIO")
     scenario = scenario_of(artifact, options.experiment(), str(path))
-    folder = out / re.sub(r"[^A-Za-z0-9_-]+", "-", artifact.name)
+    folder = out / folder_name(artifact)
     with progress(2) as steps:
         steps.begin("in process")
         in_process = simulate_scenario(artifact, scenario, str(path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,12 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
+from quasilpv.cli.console import print_json, print_note, print_table, progress
 from quasilpv.cli.systems import numbers_by_name
 from quasilpv.errors import InputError
+from quasilpv.files import claim_folder
 
 if TYPE_CHECKING:
     from quasilpv.documents.system_artifact import SystemArtifactDocument
     from quasilpv.experiments.system_run import SystemExperiment, SystemRun
+
+ARTIFACT_SUFFIXES = (".json", ".cbor")
 
 StartOption: TypeAlias = Annotated[
     list[str] | None,
@@ -99,6 +104,12 @@ class SystemOptions:
         )
 
 
+def refuse(options: Sequence[str], expected: str) -> None:
+    """Raise InputError for the first of options that were given, if there is one."""
+    for name in options:
+        raise InputError("command line", name, "a value", expected)
+
+
 def artifact_of_system(path: Path, robots: str) -> SystemArtifactDocument:
     """The controller in a file.
 
@@ -148,3 +159,47 @@ def notes_of(run: SystemRun) -> list[str]:
 def code_of(run: SystemRun) -> int:
     """Exit code 1 if a run that began inside its region did not stay."""
     return 0 if run.stayed or run.level[0] > 1.0 else 1
+
+
+def animate_system(
+    path: Path, options: SystemOptions, *, out: Path, formats: Sequence[str], log: bool, json: bool
+) -> int:
+    """Run a system and write its phase portraits in motion, its figures and its log.
+
+    Returns:
+        As `code_of`.
+
+    Raises:
+        InputError: an option or the artifact is wrong, or a file cannot be written.
+        PlantError: the equations could not be integrated.
+    """
+    from quasilpv.experiments.system_logged import write_log
+    from quasilpv.experiments.system_run import simulate
+    from quasilpv.figures.phase import write_phase_animation
+    from quasilpv.figures.systems import draw_system_run
+    from quasilpv.telemetry import LOG_NAME
+
+    artifact = artifact_of_system(path, "design animate SCENARIO")
+    folder = out / folder_name(artifact)
+    claim_folder(folder)
+    run = simulate(artifact, options.experiment(), str(path))
+    animation = folder / "phase.gif"
+    with progress(1) as steps:
+        steps.begin(f"{artifact.name}: phase portraits")
+        frames, speed = write_phase_animation(run, animation, steps.parts)
+        steps.end()
+    written = [animation, *(draw_system_run(run, folder, formats) if formats else [])]
+    if log:
+        written.append(write_log(folder / LOG_NAME, run))
+    if json:
+        print_json({**run.to_document(), "animation": str(animation), "frames": frames, "seconds_per_second": speed})
+    else:
+        print_table(artifact.name, ("", ""), [*rows_of(run), ("animation", f"{speed:.3g} s of the run per second")], 2)
+    for note in [*notes_of(run), *(f"wrote {each}" for each in written)]:
+        print_note(note)
+    return code_of(run)
+
+
+def folder_name(artifact: SystemArtifactDocument) -> str:
+    """What a folder of its runs is called."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", artifact.name)

@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from quasilpv.artifact import Artifact
     from quasilpv.descriptions.meshes import BodyMesh
     from quasilpv.systems.robots.drawing import Drawing
+    from quasilpv.telemetry import RunLog
     from quasilpv.view.live import LiveMotion
-    from quasilpv.view.page import Page
     from quasilpv.view.playback import Motion
+    from quasilpv.view.plot_page import PlotPage
 
 FRAME_S = 1.0 / 30.0
 
@@ -61,8 +62,8 @@ def view_command(
 ) -> None:
     """Show a run on a local web page: the robot, its reference, errors, torques, disturbance, premises, step times.
 
-    Pause, scrub, change the speed; drag to turn the scene. The page is served on the loopback interface only, until
-    Ctrl-C.
+    Pause, scrub, change the speed; drag to turn the scene. Of a general system: its signals, V and step times as
+    curves, its phase portraits with the region. The page is served on the loopback interface only, until Ctrl-C.
 
     \b
     Examples:
@@ -87,12 +88,27 @@ def view_command(
         mechanism = _mechanism(controller, scenario)
     else:
         recorded = open_log(log or LAST, artifact)
+        if recorded.is_of_system:
+            _show_system(recorded, port, at, browser, drawn_robot=robot or scenario or next(iter(meshes or []), None))
+            return
         controller, motion = recorded.artifact, Motion.of_log(recorded)
         mechanism = mechanism_of(recorded.scenario.plant)
         title, source = f"{recorded.scenario.name}, {recorded.header.controller}", shlex.quote(recorded.source)
     bodies = _bodies(robot, meshes or [], mechanism)
     playback = Playback(title, motion, mechanism, _disturbance_unit(controller), source, bodies)
-    page = Page(playback, port, listener)
+    _serve(Page(playback, port, listener), at, browser)
+
+
+def _show_system(log: RunLog, port: int, at: float | None, browser: bool | None, *, drawn_robot: Path | None) -> None:
+    from quasilpv.view.system_page import SystemPage, SystemTimeline
+
+    if drawn_robot is not None:
+        expected = "a log of a robot: a system is shown as curves and phase portraits"
+        raise InputError("command line", "--robot, --meshes or --scenario", str(drawn_robot), expected)
+    _serve(SystemPage(SystemTimeline.of_log(log, shlex.quote(log.source)), port), at, browser)
+
+
+def _serve(page: PlotPage, at: float | None, browser: bool | None) -> None:
     if at is not None:
         page.player.playing = False
         page.player.seek(at)
@@ -125,7 +141,7 @@ def _bodies(robot: Path | None, folders: list[Path], mechanism: Drawing) -> tupl
     return tuple(found)
 
 
-def _run(page: Page) -> None:
+def _run(page: PlotPage) -> None:
     last = time.monotonic()
     try:
         while True:

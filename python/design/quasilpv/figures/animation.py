@@ -65,6 +65,12 @@ def write_animation(
         for frame, time_s in enumerate(film.times_s):
             images.append(film.draw(float(time_s)))
             progress(frame + 1, film.times_s.size)
+    write_gif(images, path)
+    return len(images)
+
+
+def write_gif(images: Sequence[Image.Image], path: Path) -> None:
+    """Write frames as a GIF of `FRAMES_PER_SECOND`, the last one shown longer. InputError: it cannot be written."""
     # One palette for all frames, without dithering: what does not move does not flicker, and costs nothing.
     palette = images[-1].quantize(COLOURS_IN_FILE, method=Image.Quantize.FASTOCTREE)
     first, *others = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
@@ -72,7 +78,6 @@ def write_animation(
     data = io.BytesIO()
     first.save(data, format="GIF", save_all=True, append_images=others, duration=durations_ms, loop=0)
     write_atomically({path: data.getvalue()})
-    return len(images)
 
 
 class Film:

@@ -45,7 +45,7 @@ def signals_figure(run: SystemRun) -> Figure:
             is_input = signal.role == "input"
             draw = axes[k].step if is_input else axes[k].plot
             where = {"where": "post"} if is_input else {}
-            if not is_input and not exact:
+            if not is_input and np.any(run.measured[:, k] != run.state[:, k]):
                 axes[k].plot(run.time_s, run.measured[:, k], ".", color=REFERENCE_COLOUR, markersize=2.5)
             draw(run.time_s, values[:, k], color=VERMILION if is_input else BLUE, **where)
             _limits(axes[k], signal, values[:, k])
@@ -73,11 +73,20 @@ def _limits(axes: Axes, signal: Signal, values: FloatArray) -> None:
             axes.axhline(bound + signal.trim, color=BLACK, linewidth=0.8, linestyle=(0, (4, 2)))
 
 
-def region_figure(run: SystemRun) -> Figure:
-    """The region in planes of two differential states: its shadow, its cut through the trim, the domain, the run."""
+def planes_of(run: SystemRun) -> list[tuple[int, int]]:
+    """The pairs of differential states whose planes `region_figure` shows, in the order of its plots."""
+    return list(combinations(range(run.artifact.model.differential), 2))[:MOST_PLANES] or [(0, 0)]
+
+
+def region_figure(run: SystemRun, *, faint: bool = False) -> Figure:
+    """The region in planes of two differential states: its shadow, its cut through the trim, the domain, the run.
+
+    Args:
+        run: what is drawn.
+        faint: draw the run as where it will pass, and no start.
+    """
     artifact = run.artifact
-    q = artifact.model.differential
-    pairs = list(combinations(range(q), 2))[:MOST_PLANES] or [(0, 0)]
+    pairs = planes_of(run)
     columns = min(len(pairs), 3)
     rows = -(-len(pairs) // columns)
     P = np.array(artifact.region.lyapunov)
@@ -85,7 +94,7 @@ def region_figure(run: SystemRun) -> Figure:
         figure = new_figure(0.9 + 2.4 * rows, f"{artifact.name}: the region that no solution leaves, proved")
         plots = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
         for axes, pair in zip(plots, pairs, strict=False):
-            _plane(axes, run, P, pair)
+            _plane(axes, run, P, pair, faint=faint)
         for axes in plots[len(pairs) :]:
             axes.set_axis_off()
         handles, labels = plots[0].get_legend_handles_labels()
@@ -96,11 +105,11 @@ def region_figure(run: SystemRun) -> Figure:
 def draw_region(axes: Axes, run: SystemRun) -> None:
     """The same in the plane of the first two differential states, into a plot."""
     pair = (0, min(1, run.artifact.model.differential - 1))
-    _plane(axes, run, np.array(run.artifact.region.lyapunov), pair)
+    _plane(axes, run, np.array(run.artifact.region.lyapunov), pair, faint=False)
     axes.legend()
 
 
-def _plane(axes: Axes, run: SystemRun, P: FloatArray, pair: tuple[int, int]) -> None:
+def _plane(axes: Axes, run: SystemRun, P: FloatArray, pair: tuple[int, int], *, faint: bool) -> None:
     i, j = pair
     states = run.artifact.states
     centre = np.array([states[i].trim, states[j].trim])
@@ -116,8 +125,9 @@ def _plane(axes: Axes, run: SystemRun, P: FloatArray, pair: tuple[int, int]) -> 
             if np.isfinite(end):
                 draw(end, **dashes)
     axes.plot([], [], label="domain", **dashes)
-    axes.plot(run.state[:, i], run.state[:, j], color=VERMILION, label="the run")
-    axes.plot(run.state[0, i], run.state[0, j], marker="o", markersize=3, color=VERMILION)
+    axes.plot(run.state[:, i], run.state[:, j], color=VERMILION, label="the run", alpha=0.35 if faint else 1.0)
+    if not faint:
+        axes.plot(run.state[0, i], run.state[0, j], marker="o", markersize=3, color=VERMILION)
     axes.set_xlabel(_name(states[i]))
     axes.set_ylabel(_name(states[j]))
 

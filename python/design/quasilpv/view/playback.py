@@ -156,6 +156,15 @@ class Playback:
         """Time of the last sample."""
         return float(self.motion.time_s[-1])
 
+    @property
+    def step_us(self) -> FloatArray:
+        """Time of every control step; 0 where none was measured."""
+        return self.motion.step_us
+
+    def sample_at(self, time_s: float) -> int:
+        """Index of the last sample that is not later than a time; 0 before the first."""
+        return self.motion.sample_at(time_s)
+
     @cached_property
     def tool_m(self) -> FloatArray:
         """(N, 2) or (N, 3), where the tool is."""
