@@ -227,9 +227,10 @@ def test_options_of_systems_are_refused_for_robots_and_artifacts_of_robots_for_s
     assert "design track" in capsys.readouterr().err
     other = tmp_path / "system.json"
     other.write_bytes(canonical_json(released("two-tanks").to_document()))
-    for verb in (["robust", str(other)], ["hil", "serial-square", "--artifact", str(other)]):
-        assert run(verb) == 2
-        assert "one of a robot; of systems: verify, inspect, simulate, export" in capsys.readouterr().err
+    assert run(["hil", "serial-square", "--artifact", str(other)]) == 2
+    assert "one of a robot; of systems: verify, robust, inspect, simulate, export" in capsys.readouterr().err
+    assert run(["robust", str(path), "--delay", "0.001"]) == 2
+    assert "--delay" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

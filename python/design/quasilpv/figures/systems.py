@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from quasilpv.arrays import FloatArray
 from quasilpv.defaults import DEFAULT_FORMATS
 from quasilpv.documents.system_artifact import Signal
+from quasilpv.experiments.system_grid import SystemGrid
 from quasilpv.experiments.system_run import SystemRun
 from quasilpv.figures.style import BLACK, BLUE, GREEN, REFERENCE_COLOUR, VERMILION, new_figure, save, style
 
@@ -130,6 +131,32 @@ def _plane(axes: Axes, run: SystemRun, P: FloatArray, pair: tuple[int, int], *, 
         axes.plot(run.state[0, i], run.state[0, j], marker="o", markersize=3, color=VERMILION)
     axes.set_xlabel(_name(states[i]))
     axes.set_ylabel(_name(states[j]))
+
+
+def grid_figure(grid: SystemGrid) -> Figure:
+    """Where V falls least in a sample: the points of a grid check in planes of two differential states."""
+    artifact, q = grid.artifact, grid.artifact.model.differential
+    pairs = list(combinations(range(q), 2))[:MOST_PLANES] or [(0, 0)]
+    columns = min(len(pairs), 3)
+    rows = -(-len(pairs) // columns)
+    finite = np.where(np.isfinite(grid.growth), grid.growth, 1.0)
+    order, P = np.argsort(finite), np.array(artifact.region.lyapunov)
+    with style():
+        delay = f" with {grid.delay_s:.3g} s of delay" if grid.delay_s else ""
+        figure = new_figure(0.9 + 2.4 * rows, f"{artifact.name}: V+/V at {len(order)} points{delay} (sampled)")
+        plots = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
+        for axes, (i, j) in zip(plots, pairs, strict=False):
+            states, place = artifact.states, grid.state[:, [i, j]]
+            shadow = _ellipse(P[np.ix_([i, j], [i, j])]) if i != j else np.zeros((2, 0))
+            axes.plot(*(np.array([[states[i].trim], [states[j].trim]]) + shadow), color=BLACK, linewidth=0.8)
+            points = axes.scatter(*place[order].T, c=finite[order], s=4, cmap="viridis")
+            axes.plot(*place[grid.worst], "x", color=VERMILION, markersize=6)
+            axes.set_xlabel(_name(states[i]))
+            axes.set_ylabel(_name(states[j]))
+        for axes in plots[len(pairs) :]:
+            axes.set_axis_off()
+        figure.colorbar(points, ax=plots.tolist(), label="V+/V, the worst red")
+        return figure
 
 
 def _ellipse(P: FloatArray) -> FloatArray:
