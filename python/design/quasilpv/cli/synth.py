@@ -90,7 +90,7 @@ def synth_command(
         list[str] | None,
         typer.Option(
             "--disturbance",
-            metavar="NAME=SIZE",
+            metavar="NAME=VALUE",
             help="For least-l2-gain: the input, or the state to whose rate, a disturbance of this size is added.",
         ),
     ] = None,
@@ -98,7 +98,7 @@ def synth_command(
         list[str] | None,
         typer.Option(
             "--performance",
-            metavar="NAME=SIZE",
+            metavar="NAME=VALUE",
             help="For least-l2-gain: a state or an input, and which deviation of it counts as 1.",
         ),
     ] = None,

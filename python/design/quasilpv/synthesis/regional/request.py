@@ -84,7 +84,7 @@ class RegionalRequest:
         for member, allowed in known.items():
             given: Mapping[str, float] = getattr(self, member)
             if bool(given) != needs:
-                expected = "at least one, NAME=SIZE" if needs else "none: only least-l2-gain has one"
+                expected = "at least one, by name a size" if needs else "none: only least-l2-gain has one"
                 raise InputError(source, member, ", ".join(given) or "none", expected)
             for name, size in given.items():
                 if name not in allowed:
