@@ -10,6 +10,7 @@
 
 #include "artifact_fixture.hpp"
 #include "document/field.hpp"
+#include "quasilpv/tree_plant.hpp"
 
 namespace quasilpv::testing {
 namespace {
@@ -82,6 +83,28 @@ TEST(ElasticTreePlant, has_the_derivative_that_makes_its_residual_zero) {
     Eigen::VectorXd residual(plant.size());
     plant.residual(0.0, y, y_dot, residual);
     EXPECT_LT(residual.cwiseAbs().maxCoeff(), 1e-9 * (1.0 + y_dot.cwiseAbs().maxCoeff()));
+  }
+}
+
+// Of drives that lag, whose torque moves nothing at once, as of drives that do not; there it is what sample() shows.
+TEST(ElasticTreePlant, a_brake_finds_drives_that_lag_as_mobile_as_others) {
+  for (const double lag_s : {0.0, 2e-3}) {
+    ElasticTreePlant elastic(sticking_arm(lag_s));
+    ElasticTreePlant prompt(sticking_arm(0.0));
+    TreePlantParameters parameters{"rigid", elastic.parameters().tree, std::vector<JointFriction>(kJoints), lag_s};
+    TreePlant rigid(parameters);
+    parameters.lag_s = 0.0;
+    TreePlant prompt_rigid(parameters);
+    const JointArray angle{0.3, -0.5, 0.4, 0.2};
+    const JointArray motors = prompt.Plant::mobility(0.0, prompt.initial_state(angle, {}));
+    const JointArray joints = prompt_rigid.Plant::mobility(0.0, prompt_rigid.initial_state(angle, {}));
+    const JointArray found = elastic.mobility(0.0, elastic.initial_state(angle, {}));
+    const JointArray found_rigid = rigid.mobility(0.0, rigid.initial_state(angle, {}));
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      EXPECT_NEAR(found[j], motors[j], 1e-8 * motors[j]);
+      EXPECT_NEAR(found_rigid[j], joints[j], 1e-8 * joints[j]);
+      EXPECT_GT(joints[j], 0.0);
+    }
   }
 }
 

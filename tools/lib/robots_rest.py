@@ -98,7 +98,7 @@ def without_friction(robot: SpatialRobot) -> SpatialRobot:
 LAWS: Mapping[str, tuple[str, SpatialRobot]] = {
     **{law: (law, ur5()) for law in (DEFAULT_CONTROLLER, "dob-moving")},
     "motor-pid": ("motor-pid", elastic_ur5("motor")),
-    "motor-pid, encoders on both sides": ("motor-pid", elastic_ur5("both")),
+    "motor-pid, both sides": ("motor-pid", elastic_ur5("both")),
     "link-damped": ("link-damped", elastic_ur5("both")),
     **{law: (law, ur5()) for law in BASELINES},
 }

@@ -61,6 +61,7 @@ class ElasticTreePlant final : public Plant {
   void jacobian(double t, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept override;
   void derivative(double t, ConstVector y, Vector y_dot) const override;
   PlantSample sample(double t, ConstVector y) const override;
+  JointArray mobility(double t, ConstVector y) override;
 
   /// Kinetic, gravity's, the springs' and the bristles' energy, J; see TreeDynamics::energy().
   double energy(ConstVector y) const;

@@ -29,6 +29,10 @@ class Plant : public ImplicitSystem {
   /// derivative().
   virtual PlantSample sample(double t, ConstVector y) const = 0;
 
+  /// By how much a torque accelerates what it pushes, per joint, 1/(kg m^2): of drives that lag, once they have
+  /// followed. Default: sample() with a unit torque less sample() without one. Throws PlantError like sample().
+  virtual JointArray mobility(double t, ConstVector y);
+
   /// Control torque (N m) in force from now on.
   void set_torque(const JointArray& torque) noexcept { torque_ = torque; }
   const JointArray& torque() const noexcept { return torque_; }

@@ -44,6 +44,7 @@ class TreePlant final : public Plant {
   void jacobian(double t, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept override;
   void derivative(double t, ConstVector y, Vector y_dot) const override;
   PlantSample sample(double t, ConstVector y) const override;
+  JointArray mobility(double t, ConstVector y) override;
 
  private:
   bool lags() const noexcept { return parameters_.lag_s > 0.0; }

@@ -224,6 +224,10 @@ PlantSample ElasticTreePlant::sample(double t, ConstVector y) const {
   return sample;
 }
 
+JointArray ElasticTreePlant::mobility(double /*t*/, ConstVector /*y*/) {
+  return joint_array(parameters_.torque_loop.gain * rotor_.cwiseInverse());
+}
+
 double ElasticTreePlant::energy(ConstVector y) const {
   const int n = joints();
   const TreeVector deflection = y.segment(n, n) - y.head(n);

@@ -1,5 +1,7 @@
 #include "quasilpv/plant.hpp"
 
+#include <cstddef>
+
 namespace quasilpv {
 
 Eigen::VectorXd ImplicitSystem::differential() const { return Eigen::VectorXd::Ones(size()); }
@@ -17,6 +19,21 @@ JointArray Plant::joint_torque(double t) const noexcept {
     torque[j] += torque_[j];
   }
   return torque;
+}
+
+JointArray Plant::mobility(double t, ConstVector y) {
+  const JointArray held = torque();
+  set_torque({});
+  const JointArray without = sample(t, y).driven_acceleration();
+  JointArray mobility{};
+  for (std::size_t j = 0; j < static_cast<std::size_t>(joints()); ++j) {
+    JointArray unit{};
+    unit[j] = 1.0;
+    set_torque(unit);
+    mobility[j] = sample(t, y).driven_acceleration()[j] - without[j];
+  }
+  set_torque(held);
+  return mobility;
 }
 
 }  // namespace quasilpv

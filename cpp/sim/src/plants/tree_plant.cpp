@@ -135,6 +135,12 @@ PlantSample TreePlant::sample(double t, ConstVector y) const {
           external_torque().at(t)};
 }
 
+JointArray TreePlant::mobility(double /*t*/, ConstVector y) {
+  const int n = joints();
+  const TreeMatrix inverse = dynamics_.inertia(y.data()).llt().solve(TreeMatrix::Identity(n, n));
+  return joint_array(inverse.diagonal());
+}
+
 namespace plants {
 
 PlantKind tree() {

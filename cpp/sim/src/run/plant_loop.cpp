@@ -143,14 +143,10 @@ const char* to_string(PlantRunEnd end) noexcept {
 JointArray viscous_brake(const Scenario& scenario, double time_constant_s) {
   const std::unique_ptr<Plant> plant = scenario.make_plant();
   const Eigen::VectorXd state = plant->initial_state(scenario.initial_angle, scenario.initial_speed);
-  const JointArray without_torque = plant->sample(0.0, state).driven_acceleration();
+  const JointArray mobility = plant->mobility(0.0, state);
   JointArray brake{};
   for (std::size_t j = 0; j < static_cast<std::size_t>(plant->joints()); ++j) {
-    JointArray unit{};
-    unit[j] = 1.0;
-    plant->set_torque(unit);
-    const double mobility = plant->sample(0.0, state).driven_acceleration()[j] - without_torque[j];
-    brake[j] = 1.0 / (time_constant_s * mobility);
+    brake[j] = 1.0 / (time_constant_s * mobility[j]);
   }
   return brake;
 }
