@@ -5,20 +5,27 @@ from __future__ import annotations
 import csv
 import json
 import subprocess
+import time
+from collections.abc import Sequence
 from pathlib import Path
 
+import lcm
 import numpy as np
 import pytest
 
+from quasilpv import _runtime
 from quasilpv.artifact.system_store import write_system_artifact
 from quasilpv.cli.app import run
 from quasilpv.documents.canonical import canonical_json
+from quasilpv.documents.system_artifact import SystemArtifactDocument
 from quasilpv.errors import ClaimError, InputError
 from quasilpv.experiments.processes import Talk
 from quasilpv.experiments.system_hil import require_identical, run_system_over_lcm
 from quasilpv.experiments.system_run import SystemExperiment, scenario_of, simulate, simulate_scenario
 from quasilpv.scenarios import write_system_scenario
 from quasilpv.scenarios.system_schema import SystemScenario
+from quasilpv.telemetry.message_types import channel_type
+from quasilpv.telemetry.system_recording import COMMAND, MEASUREMENT, system_messages
 from reference.released_systems import changed, released
 from two_processes import LIMIT_S, executable
 
@@ -176,6 +183,94 @@ def test_a_plant_that_is_left_alone_in_real_time_goes_to_its_trim_input(
         rows = list(csv.DictReader(file))
     assert float(rows[-1]["command_delay_s"]) == -1.0
     assert float(rows[-1]["input.u"]) == artifact.inputs[0].trim
+
+
+# ---- a plant that is not ours ----------------------------------------------------------------------------------------
+
+
+class SignalsPlant:
+    """The plant's side of the wire in Python: says anything, hears the commands that answer it."""
+
+    def __init__(self, artifact: SystemArtifactDocument, port: int) -> None:
+        self._artifact = artifact
+        self._commands: list[np.void] = []
+        self._wire = lcm.LCM(f"udpm://239.255.76.67:{port}?ttl=0")
+        self._wire.subscribe(COMMAND, self._hear)
+
+    def _hear(self, _: str, data: bytes) -> None:
+        kind = channel_type(COMMAND)
+        assert kind.refusal(data) is None
+        self._commands.append(kind.decode([data])[0])
+
+    def send(self, seq: int, states: Sequence[float], **members: int) -> None:
+        told = np.array([[*states, *[0.0] * len(self._artifact.parameters)]])
+        records = system_messages(MEASUREMENT, self._artifact, np.array([seq]), {"told": told}, session=7)
+        records["sender"] = 12345
+        for name, value in members.items():
+            records[name] = value
+        self._wire.publish(MEASUREMENT, channel_type(MEASUREMENT).encode(records)[0])
+
+    def answer(self, seq: int, states: Sequence[float]) -> np.void:
+        """The command for this measurement, which is repeated until it is answered."""
+        deadline = time.monotonic() + LIMIT_S
+        while time.monotonic() < deadline:
+            self.send(seq, states)
+            self._wire.handle_timeout(50)
+            found = [command for command in self._commands if command["seq"] == seq]
+            if found:
+                self._commands.clear()
+                return found[-1]
+        raise AssertionError(f"no command for sample {seq}")
+
+    def hears_nothing_within(self, milliseconds: int) -> bool:
+        self._commands.clear()
+        self._wire.handle_timeout(milliseconds)
+        return not self._commands
+
+
+def test_when_measurements_are_not_numbers_expect_the_input_held_then_the_trim_and_a_way_back(
+    artifact_path: Path, port: int
+) -> None:
+    artifact = released("dc-bus")
+    n, [u] = len(artifact.states), artifact.inputs
+    good, bad = [0.0] * n, [0.0] * n
+    good[[signal.name for signal in artifact.states].index("v")] = 2.0
+    bad[0] = float("nan")
+    controller = start(artifact_path.parent, "qlpv-controller", port=port)
+    try:
+        plant = SignalsPlant(artifact, port)
+        own = _runtime.SystemController(_runtime.SystemArtifact.load(str(artifact_path)))
+        first = plant.answer(0, good)
+        assert first["input"][0] == own.step(good, [0.0] * len(artifact.parameters))["input"][0] != u.trim
+        for wrong in ({"session": 8}, {"artifact_hash": 1}, {"signals": n}):
+            plant.send(1, good, **wrong)
+        assert plant.hears_nothing_within(200)
+        for seq in range(1, 20):
+            command = plant.answer(seq, bad)
+            assert (command["state"], command["input"][0], command["flags"]) == (3, first["input"][0], 1)
+        assert plant.answer(20, bad)["state"] == 4
+        settled = 21 + int(0.05 / artifact.sample_period_s)
+        for seq in range(21, settled):
+            last = plant.answer(seq, good)
+        assert (last["state"], last["input"][0]) == (4, u.trim)
+        operator = [executable("qlpv-controller"), "--reset-fault", "--artifact", str(artifact_path), "--session", "7"]
+        with subprocess.Popen([*operator, "--url", f"udpm://239.255.76.67:{port}?ttl=0", "--timeout-s", "20"]) as reset:
+            for seq in range(settled, settled + 2000):
+                if plant.answer(seq, good)["state"] != 4:
+                    break
+            again = plant.answer(seq + 1, good)
+            plant.answer(seq + 2, good)  # the operator may have missed one
+            reset.wait(timeout=LIMIT_S)
+        assert reset.returncode == 0
+        assert (again["state"], again["input"][0]) == (2, first["input"][0])
+    finally:
+        controller.terminate()
+        report, _ = controller.communicate(timeout=LIMIT_S)
+    told = json.loads(report)
+    assert (told["end"], told["faults"], told["resets"]) == ("stopped", 1, 1)  # after the stop there was no sample
+    assert told["predicted_steps"] == 20
+    assert told["link"]["wrong_session"] == 1
+    assert told["link"]["wrong_artifact"] == 2
 
 
 # ---- the verb -------------------------------------------------------------------------------------------------------

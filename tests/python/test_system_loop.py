@@ -228,7 +228,8 @@ def test_options_of_systems_are_refused_for_robots_and_artifacts_of_robots_for_s
     other = tmp_path / "system.json"
     other.write_bytes(canonical_json(released("two-tanks").to_document()))
     assert run(["hil", "serial-square", "--artifact", str(other)]) == 2
-    assert "one of a robot; of systems: verify, robust, inspect, simulate, export" in capsys.readouterr().err
+    others = "one of a robot; of systems: verify, robust, inspect, simulate, hil, animate, export"
+    assert others in capsys.readouterr().err
     assert run(["robust", str(path), "--delay", "0.001"]) == 2
     assert "--delay" in capsys.readouterr().err
 

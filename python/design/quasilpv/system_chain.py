@@ -32,6 +32,7 @@ from quasilpv.errors import InputError, one_of
 from quasilpv.experiments.system_run import SystemExperiment, SystemRun, simulate
 from quasilpv.figures.style import style
 from quasilpv.figures.systems import draw_region, region_figure, signals_figure
+from quasilpv.scenarios import NOISE_SEED
 from quasilpv.shown import html_table
 from quasilpv.synthesis.regional.request import Objective, RegionalRequest
 from quasilpv.system_release import release_system
@@ -123,6 +124,9 @@ class SystemController:
         *,
         delay_s: float = 0.0,
         rk4_steps: int = 0,
+        noise: Mapping[str, float] | None = None,
+        quantisation: Mapping[str, float] | None = None,
+        seed: int = NOISE_SEED,
     ) -> SystemSimulation:
         """Run it in C++ against the nonlinear equations.
 
@@ -132,12 +136,24 @@ class SystemController:
             duration_s: six times 1 / decay rate by default.
             delay_s: until an input acts, at most one sample.
             rk4_steps: of the Runge-Kutta method per sample; 0 for IDA.
+            noise: standard deviations of white noise on what is measured of states, by name.
+            quantisation: steps to which what is measured of states is rounded, by name.
+            seed: of the noise; equal seeds give equal runs.
 
         Raises:
             InputError: a name is unknown or a number out of range.
             PlantError: the equations could not be integrated.
         """
-        experiment = SystemExperiment(start or {}, parameters or {}, duration_s, delay_s, rk4_steps)
+        experiment = SystemExperiment(
+            start or {},
+            parameters or {},
+            duration_s,
+            delay_s,
+            rk4_steps,
+            noise=noise or {},
+            quantisation=quantisation or {},
+            seed=seed,
+        )
         return SystemSimulation(simulate(self.artifact, experiment, self.artifact.name))
 
     def write(self, folder: Path | str) -> Path:

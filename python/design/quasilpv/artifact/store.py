@@ -58,7 +58,7 @@ def read_artifact(path: Path | str) -> Artifact:
             source,
             "schema",
             "a controller of a system",
-            "one of a robot; of systems: verify, robust, inspect, simulate, export",
+            "one of a robot; of systems: verify, robust, inspect, simulate, hil, animate, export",
         )
     return Artifact.from_document(document, source)
 
