@@ -28,7 +28,7 @@ from quasilpv.certificate.laws.motor_pid import MotorPidLaw
 from quasilpv.conditions.tracking.sampled_chains import observer_gains
 from quasilpv.documents.payloads import TreePayloads
 from quasilpv.documents.strict_model import validate
-from quasilpv.errors import InfeasibleError
+from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.loops.elastic_loop import MotorLaw, growth_rate
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.tree_law import design_inertia
@@ -47,6 +47,9 @@ BESIDE_A_PROOF = 20
 
 DEAD_ZONE_COUNTS = 3
 """Of the encoder: what the integral leaves alone where Coulomb friction is stated, since a motor that sticks hunts."""
+
+DAMPINGS_S = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4)
+"""Over stiffness: what is tried for whoever states none."""
 
 MOTOR_CORRECTION, SENSED_CORRECTION = 3.0, 8.0
 """Bandwidths of the correction, rad/s: by the motors' torques, which friction is part of, and by sensors."""
@@ -84,11 +87,13 @@ def motor_pid(robot: SpatialRobot, specification: Specification, progress: Progr
         InfeasibleError: no choice of gains is stable on the whole grid.
     """
     drives = elastic_drives(robot, "motor-pid", ("motor", "both"))
-    reach = Reach.of(robot, specification)
-    period = specification.sample_period_s
-    source, correction = _correction(drives)
-    choices = [replace(choice, correction=correction) for choice in CHOICES]
-    laws = {choice: _law(robot, drives, choice, period, source) for choice in choices}
+    try:
+        reach = Reach.of(robot, specification)
+    except InputError as error:
+        needed = _least_damping(robot, specification)
+        more = f"from {needed:g} s on it is proved" if needed is not None else "none of these would be proved"
+        raise InputError(error.source, error.field, error.got, f"{error.expected}; {more}") from error
+    laws = _laws(robot, drives, specification.sample_period_s)
     witness = _links_witness(robot, specification)
     given_up = []
     for choice, law in laws.items() if witness is not None else ():
@@ -111,6 +116,30 @@ def motor_pid(robot: SpatialRobot, specification: Specification, progress: Progr
         f"by {min(rates):.3g} 1/s in a posture of the grid: its elastic modes are beyond the reach of this sample "
         "rate, or need more damping (joints.NAME.damping_least)"
     )
+
+
+def _laws(robot: SpatialRobot, drives: tuple[ElasticDrive, ...], period_s: float) -> dict[Gains, MotorLaw]:
+    """With the choices of gains, the stiffest first."""
+    source, correction = _correction(drives)
+    choices = [replace(choice, correction=correction) for choice in CHOICES]
+    return {choice: _law(robot, drives, choice, period_s, source) for choice in choices}
+
+
+def _least_damping(robot: SpatialRobot, specification: Specification) -> float | None:
+    """The first of a few dampings of all gears with which some choice of gains is proved; None if there is none."""
+    witness = _links_witness(robot, specification)
+    for damping_s in DAMPINGS_S if witness is not None else ():
+        joints = tuple(
+            replace(joint, drive=replace(drive, damping_least_s=max(damping_s, drive.damping_least_s)))
+            for joint in robot.joints
+            if (drive := joint.drive) is not None
+        )
+        damped = replace(robot, joints=joints)
+        drives = elastic_drives(damped, "motor-pid", ("motor", "both"))
+        laws = _laws(damped, drives, specification.sample_period_s).values()
+        if any(_excluded(damped, law, witness or {}, specification).proved for law in laws):
+            return damping_s
+    return None
 
 
 def _grid(
