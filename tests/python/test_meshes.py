@@ -14,6 +14,9 @@ from quasilpv.cli import run
 from quasilpv.descriptions.meshes import body_meshes, located
 from quasilpv.descriptions.robot_file import read_robot_file
 from quasilpv.errors import InputError
+from quasilpv.systems.robots.tree_mechanism import TreeMechanism
+from quasilpv.view.page import Page
+from quasilpv.view.playback import Motion, Playback
 
 UR5 = Path(__file__).parents[2] / "examples/ur5"
 LINKS = ("base", "upper_arm", "wrist_3_link", "flange")
@@ -110,3 +113,38 @@ def test_when_folders_are_stated_without_a_robot_expect_a_line(
 ) -> None:
     assert run(["view", "--log", str(tmp_path / "none.lcmlog"), "--meshes", str(tmp_path)]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_the_page_shows_the_bodies_in_place_of_bars_and_moves_them_with_their_joints(tmp_path: Path) -> None:
+    file = with_visuals(tmp_path, {"wrist_3_link": "box.stl"})
+    write_box(tmp_path / "box.stl")
+    source = read_robot_file(file)
+    tree = source.robot().tree
+    angle = np.array([[0.0] * 6, [0.3, -1.0, 1.2, -0.4, 0.9, 2.0]])
+    nothing, flags = np.zeros((2, 6)), np.zeros(2, dtype=np.int64)
+    motion = Motion(
+        time_s=np.array([0.0, 1.0]),
+        reference_angle_rad=angle,
+        angle_rad=angle,
+        torque_nm=nothing,
+        estimate=nothing,
+        disturbance=nothing,
+        weight=np.zeros((2, 0)),
+        lyapunov_rad2=np.full(2, np.nan),
+        state=flags,
+        flags=flags,
+        step_us=np.zeros(2),
+    )
+    meshes = tuple(body_meshes(source)[0])
+    page = Page(Playback("arm", motion, TreeMechanism(tree, (0.0,) * 6, (0.0,) * 6), "N m", "", meshes), 0)
+    try:
+        assert not page.scene.robot.root.visible
+        page.player.seek(1.0)
+        page.step(0.0)
+        [(joint, body)] = page.scene.bodies
+        rotation, origin = tree.frames(angle[1])[joint]
+        np.testing.assert_allclose(body.position, origin, atol=1e-6)
+        turned = pin.Quaternion(*body.wxyz).toRotationMatrix()
+        np.testing.assert_allclose(turned, rotation, atol=1e-6)
+    finally:
+        page.close()

@@ -47,6 +47,7 @@ class RobotScene:
 
     Attributes:
         robot: its links and joints.
+        bodies: joint and mesh of every body that has one.
         exaggeration: by which the error is magnified.
         show_shadow: whether the robot on its reference can be told from the robot.
     """
@@ -60,7 +61,7 @@ class RobotScene:
         # A link that only ties things together, as the spring of the disc, may have no length at some time.
         width = 0.075 * float(np.max(lengths))
         self.robot = _Bars(scene, "robot", links.shape, width, (LINK_COLOUR, None))
-        self._bodies = [_add_body(scene, mesh) for mesh in playback.meshes]
+        self.bodies = [_add_body(scene, mesh) for mesh in playback.meshes]
         self._shadow = _Bars(scene, "reference robot", links.shape, 0.6 * width, (SHADOW_COLOUR, 0.35))
         self._scene = scene
         self._line_width = 0.12 * width
@@ -68,7 +69,7 @@ class RobotScene:
         self._place_camera(server, playback)
         self.show_paths(playback)
         self.show_shadow = self.exaggeration == 1.0
-        self.set_visible(shadow=self.show_shadow, magnified=True, skeleton=not self._bodies)
+        self.set_visible(shadow=self.show_shadow, magnified=True, skeleton=not self.bodies)
 
     def _place_camera(self, server: viser.ViserServer, playback: Playback) -> None:
         count = playback.motion.samples
@@ -128,7 +129,7 @@ class RobotScene:
         """Move everything to an instant."""
         self.robot.move(instant.links_m)
         self._shadow.move(instant.reference_links_m)
-        for joint, body in self._bodies:
+        for joint, body in self.bodies:
             rotation, origin = instant.frames[joint + 1]
             body.wxyz, body.position = SO3.from_matrix(rotation).wxyz, _triple(origin)
         drawn = int(np.searchsorted(self._rows, instant.sample, side="right"))
