@@ -36,6 +36,7 @@ def dc_bus(deviation_max_v: float = 12.0, power_w: tuple[float, float] = (200.0,
         outputs=["i", "v"],
         domain={"v": (-deviation_max_v, deviation_max_v), "P": power_w},
         unknown="P",
+        units={"i": "A", "v": "V", "j": "A", "u": "V", "P": "W"},
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +17,12 @@ from quasilpv.experiments.processes import Talk
 from quasilpv.experiments.system_hil import require_identical, run_system_over_lcm
 from quasilpv.experiments.system_logged import logged_system_run, write_log
 from quasilpv.experiments.system_run import SystemExperiment, scenario_of, simulate
+from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.telemetry import LOG_NAME, RunLog, read_log
-from quasilpv.telemetry.message_types import channel_type
+from quasilpv.telemetry.mcap_export import json_schema
+from quasilpv.telemetry.message_types import channel_type, message_type
 from quasilpv.telemetry.replay import replay
+from quasilpv.telemetry.system_recording import names_of, units_of
 from reference.released_systems import released
 from two_processes import executable
 
@@ -99,7 +103,7 @@ def test_a_state_that_left_its_domain_is_named_in_the_log(
     assert run(["log", "info", "LAST", "--json"]) == 0
     info = json.loads(capsys.readouterr().out)
     assert "plant left its domain: v" in [event["event"] for event in info["events"]]
-    assert info["signals"]["u"] == "input"
+    assert info["signals"]["u"] == "input, V"
 
 
 def test_the_verbs_of_logs_take_one_of_a_system(
@@ -108,7 +112,7 @@ def test_the_verbs_of_logs_take_one_of_a_system(
     monkeypatch.chdir(tmp_path)
     assert run(["log", "info", made.source]) == 0
     shown = capsys.readouterr().out
-    assert "v (state)" in shown
+    assert "v (state, V)" in shown
     assert "QLPV_SIGNALS_TELEMETRY" in shown
     assert "QLPV_TELEMETRY" not in shown
     assert run(["log", "replay", made.source]) == 0
@@ -125,6 +129,18 @@ def test_the_verbs_of_logs_take_one_of_a_system(
     assert truth[0]["state"]["v"] == 8.0
     assert set(truth[0]["state"]) == {"i", "v", "j"}
     assert set(next(message for name, message in messages if name.endswith("command_v1"))["input"]) == {"u"}
+
+
+def test_units_are_those_of_the_equations_and_a_unit_of_nothing_is_refused() -> None:
+    equations: dict[str, Any] = {"state": "x v", "inputs": "u", "domain": {"x": (-1, 1), "m": (1, 2)}, "unknown": "m"}
+    given = {"x": "rad", "u": "N m", "m": "kg"}
+    texts = ["x' = v", "m*v' = sin(x) + u"]
+    assert DescriptorSystem.from_equations(texts, **equations, units=given).units == given
+    for units, words in (({"y": "m"}, "units"), ({"x": ""}, "units: x"), ({"x": "m" * 33}, "1 to 32 characters")):
+        with pytest.raises(InputError, match=words):
+            DescriptorSystem.from_equations(texts, **equations, units=units)
+    shape = json_schema(message_type("signals_truth_v1"), names_of(released("dc-bus")), units_of(released("dc-bus")))
+    assert shape["properties"]["state"]["properties"]["v"]["description"] == "V"
 
 
 def test_a_log_of_a_system_is_none_of_a_robot(made: RunLog) -> None:

@@ -109,7 +109,8 @@ def _signals(request: RegionalRequest) -> list[dict[str, Any]]:
 
     def signal(name: str, role: str, bounds: tuple[float, float], value: float, known: bool = True) -> dict[str, Any]:
         low, high = (bound if isfinite(bound) else None for bound in map(float, bounds))
-        return {"name": name, "role": role, "unit": "1", "low": low, "high": high, "trim": value, "known": known}
+        unit = system.units.get(name, "1")
+        return {"name": name, "role": role, "unit": unit, "low": low, "high": high, "trim": value, "known": known}
 
     everything = (-np.inf, np.inf)
     states = [

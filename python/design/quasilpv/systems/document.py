@@ -67,6 +67,7 @@ class SystemDocument(_Part):
         domain: by name, lower and upper bound.
         unknown: parameters the controller does not know.
         equilibrium: the origin if left out.
+        units: by name, of states, inputs and what the domain names.
     """
 
     schema_: Literal["quasilpv.system"] = Field(alias="schema")
@@ -81,6 +82,7 @@ class SystemDocument(_Part):
     domain: dict[Text, Annotated[list[Value], Field(min_length=2, max_length=2)]] = {}
     unknown: list[Text] = []
     equilibrium: EquilibriumEntry | None = None
+    units: dict[Text, Text] = {}
 
 
 def document_kind(reference: str) -> SystemKind:
@@ -195,4 +197,5 @@ def _system(document: SystemDocument, source: str, values: Mapping[str, sp.Expr]
         unknown=document.unknown,
         equilibrium=(values_of[0], values_of[1]),
         constants=values,
+        units=document.units,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -11,13 +11,15 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike, NDArray
 
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, one_of
 from quasilpv.shown import html_table
 from quasilpv.systems.descriptor.names import symbol
 from quasilpv.systems.descriptor.premise import AffineMatrix, Premise
 
 SHOWN_PREMISES = 6
 """In the short description of a system."""
+MAX_UNIT = 32
+"""Characters of the text of a unit."""
 
 
 class SystemMatrices(NamedTuple):
@@ -48,9 +50,10 @@ class AffineSystem:
         from_formulas: the drift was given as a function of the state, and A(x) is one way among others to write it as
             A(x) x (`from_equations`).
         trim: the equilibrium that states and inputs are deviations from, (n + m,); empty for the origin.
+        units: by name of a state, an input or a parameter, for people, logs and figures; those not named have none.
 
     Raises:
-        InputError: the shapes of the parts do not agree, or E has not the form diag(E_1(z), 0).
+        InputError: the shapes of the parts do not agree, E has not the form diag(E_1(z), 0), or a unit is of nothing.
 
     Reference: Dehak 2022, (I.1), (I.21) and (I.25).
     """
@@ -68,23 +71,34 @@ class AffineSystem:
     given_by_rules: bool = False
     from_formulas: bool = False
     trim: tuple[float, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse parts whose sizes disagree and states in another order than differential, algebraic."""
+        """Refuse parts whose sizes disagree, states in another order than differential, algebraic, and units of
+        nothing."""
+        self._require_units()
         n, m = len(self.state), len(self.inputs)
         expected = {"E": (n, n), "A": (n, n), "B": (n, m), "C": (self.C.shape[0], n)}
-        for field, shape in expected.items():
-            matrix: AffineMatrix = getattr(self, field)
+        for name, shape in expected.items():
+            matrix: AffineMatrix = getattr(self, name)
             if matrix.shape != shape:
-                raise InputError(self.name, field, f"shape {matrix.shape}", f"shape {shape}")
+                raise InputError(self.name, name, f"shape {matrix.shape}", f"shape {shape}")
             if matrix.premises != len(self.premises):
-                raise InputError(self.name, field, f"{matrix.premises} coefficients", f"{len(self.premises)}")
+                raise InputError(self.name, name, f"{matrix.premises} coefficients", f"{len(self.premises)}")
         present = self._entries_of_E
         q = self.differential
         if present[q:].any() or present[:, q:].any() or not present[:, :q].any(axis=0).all():
             rows, columns = present.any(axis=1), present.any(axis=0)
             got = f"non-zero rows {np.flatnonzero(rows).tolist()} and columns {np.flatnonzero(columns).tolist()}"
             raise InputError(self.name, "E", got, "diag(E_1, 0): the algebraic equations and states last")
+
+    def _require_units(self) -> None:
+        names = [symbol.name for symbol in (*self.state, *self.domain)] + list(self.inputs)
+        for name, unit in self.units.items():
+            if name not in names:
+                raise InputError(self.name, "units", name, one_of(names, name))
+            if not (isinstance(unit, str) and 0 < len(unit) <= MAX_UNIT and unit.isprintable()):
+                raise InputError(self.name, f"units: {name}", repr(unit), f"a text of 1 to {MAX_UNIT} characters")
 
     def __repr__(self) -> str:
         """In a few lines: name, sizes, premises."""
@@ -115,7 +129,7 @@ class AffineSystem:
 
     def __getstate__(self) -> dict[str, Any]:
         """The parts only: compiled functions of them do not travel between processes."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def order(self) -> int:

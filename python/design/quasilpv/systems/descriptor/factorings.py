@@ -140,4 +140,4 @@ def _rebuilt(system: DescriptorSystem, E: sp.Matrix, A: sp.Matrix, B: sp.Matrix,
         domain=system.domain,
         unknown=unknown,
     )
-    return replace(other, disturbance=system.disturbance, from_formulas=system.from_formulas)
+    return replace(other, disturbance=system.disturbance, from_formulas=system.from_formulas, units=system.units)

@@ -98,6 +98,7 @@ class DescriptorSystem(AffineSystem):
         disturbance: tuple[float, ...] = (),
         from_formulas: bool = False,
         trim: tuple[float, ...] = (),
+        units: Mapping[str, str] | None = None,
     ) -> DescriptorSystem:
         """The system of matrices whose entries have been read; state and domain are those of the names by default."""
         state, domain = state or names.state, names.domain if domain is None else domain
@@ -114,6 +115,7 @@ class DescriptorSystem(AffineSystem):
                     disturbance=disturbance,
                     from_formulas=from_formulas,
                     trim=trim,
+                    units=units,
                 )
             left_open.made.append(Made(system, matrices, premises, names.unknown))
             return system
@@ -135,6 +137,7 @@ class DescriptorSystem(AffineSystem):
             disturbance=disturbance,
             from_formulas=from_formulas,
             trim=trim,
+            units=dict(units or {}),
         )
 
     @classmethod
@@ -150,6 +153,7 @@ class DescriptorSystem(AffineSystem):
         unknown: str | Collection[Name] = (),
         equilibrium: tuple[Any, Any] | None = None,
         constants: Mapping[str, sp.Expr] | None = None,
+        units: Mapping[str, str] | None = None,
     ) -> DescriptorSystem:
         """The system of implicit equations ``F(x, x', u) = 0``, affine in x' and u, around an equilibrium.
 
@@ -170,6 +174,8 @@ class DescriptorSystem(AffineSystem):
                 State and inputs of the system are then the deviations from it, under the same names. The origin if not
                 given.
             constants: by name, numbers that stand for that name in every formula.
+            units: by name, of states, inputs and parameters: text that goes with the signals into artifacts, logs and
+                figures, and means nothing to the design.
 
         Returns:
             The system. What the equations leave over at the equilibrium, up to `equations.RESIDUAL` of the terms of a
@@ -194,6 +200,7 @@ class DescriptorSystem(AffineSystem):
             disturbance=matrices.d if any(matrices.d) else (),
             from_formulas=True,
             trim=around.values(matrices.state, names.inputs),
+            units=units,
         )
 
     @classmethod
