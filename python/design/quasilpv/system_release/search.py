@@ -23,7 +23,7 @@ period T needs ``b (b + J) < 2 alpha / T``, about."""
 DECAYS = (1.0, 3.0, 10.0)
 """Decay rates that are tried if none is asked for, in units of the default one: more decay allows a longer period."""
 
-FIRST_UNITS = 2
+FIRST_UNITS = 1
 """In so many units every factoring is tried first."""
 
 RATES_HZ = (1e3, 1e4, 1e5)
