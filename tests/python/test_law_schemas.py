@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, Literal, get_args, get_type_hints
 
 import pytest
 
@@ -22,6 +22,7 @@ NAMES_OF_TYPES: list[tuple[Any, str]] = [
     (NonNegative, "non-negative"),
     (bool, "boolean"),
     (CorrectionSource, "correction-source"),
+    (Literal["link"], "angle-side"),
     (int, "integer"),
     (tuple[Number, Number, Number, Number], "numbers"),
     (Vector, "joint-values"),

@@ -68,13 +68,15 @@ class Row:
         return [self.robot, self.arm_class, self.law, self.evidence, *numbers]
 
 
-def elastic(robot: SpatialRobot, name: str, side: EncoderSide, spread: tuple[float, float]) -> SpatialRobot:
+def elastic(
+    robot: SpatialRobot, name: str, side: EncoderSide, spread: tuple[float, float], torque_loop: bool = False
+) -> SpatialRobot:
     """An arm with the gears of the table; their stiffness within these factors of the middle."""
     joints = tuple(
         replace(
             joint,
             rotor_inertia_kg_m2=rotor,
-            drive=ElasticDrive((spread[0] * pull, spread[1] * pull), DAMPING_S, side, False, False),
+            drive=ElasticDrive((spread[0] * pull, spread[1] * pull), DAMPING_S, side, torque_loop, torque_loop),
         )
         for joint, (rotor, pull) in zip(robot.joints, GEARS[name], strict=True)
     )
@@ -114,9 +116,14 @@ def rows(name: str) -> Iterator[Row]:
     """Runs of one arm."""
     robot, experiment = rigid(name)
     wide = (1.0 / UNCERTAINTY, UNCERTAINTY)
-    asked: list[tuple[EncoderSide, str]] = [("motor", "motor-pid"), ("both", "motor-pid"), ("both", "link-damped")]
-    for side, controller in asked:
-        design = synthesise(DesignRequest.of(elastic(robot, name, side, wide), controller))
+    asked: list[tuple[EncoderSide, bool, str]] = [
+        ("motor", False, "motor-pid"),
+        ("both", False, "motor-pid"),
+        ("both", False, "link-damped"),
+        ("both", True, "dob-acceleration"),
+    ]
+    for side, loop, controller in asked:
+        design = synthesise(DesignRequest.of(elastic(robot, name, side, wide, loop), controller))
         artifact = checked_artifact(design)
         made = {controller: (artifact, str(design.report["evidence"]))}
         if side == "motor":
@@ -124,7 +131,7 @@ def rows(name: str) -> Iterator[Row]:
             made["motor-pid, load known"] = (to_artifact(told(design)), "not looked at")
         for label, (law, evidence) in made.items():
             for factor in FACTORS:
-                true = elastic(robot, name, side, (factor, factor))
+                true = elastic(robot, name, side, (factor, factor), loop)
                 with tempfile.TemporaryDirectory() as folder:
                     setup = RunSetup(experiment.by(true), law, transport_delay_s=DELAY_S, log=False)
                     found = track(setup, Path(folder)).metrics

@@ -10,14 +10,16 @@ ROTORS = (0.6, 0.6, 0.6, 0.13, 0.13, 0.13)
 STIFFNESS = (3e4, 3e4, 2e4, 6e3, 6e3, 6e3)
 
 
-def elastic_ur5(*, side: EncoderSide = "motor", uncertainty: float = 1.0, damping_s: float = 1.5e-4) -> SpatialRobot:
+def elastic_ur5(
+    *, side: EncoderSide = "motor", uncertainty: float = 1.0, damping_s: float = 1.5e-4, torque_loop: bool = False
+) -> SpatialRobot:
     """The UR5 with harmonic drives: stiffness within a factor of the middle, damping over stiffness."""
     robot = ur5()
     joints = tuple(
         replace(
             joint,
             rotor_inertia_kg_m2=rotor,
-            drive=ElasticDrive((pull / uncertainty, pull * uncertainty), damping_s, side, False, False),
+            drive=ElasticDrive((pull / uncertainty, pull * uncertainty), damping_s, side, torque_loop, torque_loop),
         )
         for joint, rotor, pull in zip(robot.joints, ROTORS, STIFFNESS, strict=True)
     )

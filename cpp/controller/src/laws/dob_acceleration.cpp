@@ -18,9 +18,11 @@ struct DobAccelerationParameters final : ObserverParameters {
   bool disturbance_compensation = true;  ///< false: observed and predicted, but not subtracted
   std::optional<LyapunovBound> bound;    ///< none: not designed for one
   std::optional<MotionLimits> limits;    ///< none: the proof does not depend on the motion
+  AngleSide side = AngleSide::kJoint;    ///< of gears whose drives control their torques: the link's
 
   const LyapunovBound* lyapunov_bound() const noexcept override { return bound ? &*bound : nullptr; }
   const MotionLimits* motion_limits() const noexcept override { return limits ? &*limits : nullptr; }
+  AngleSide controlled_side() const noexcept override { return side; }
   std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
 };
 
@@ -148,6 +150,10 @@ LawKind dob_acceleration() {
   law.boolean("disturbance_compensation", &P::disturbance_compensation);
   law.object("lyapunov_bound", &P::bound, bound_table());
   law.object("motion_limits", &P::limits, limits_table());
+  law.add({"angle_side", "angle-side", true}, [](const Field& field, int /*joints*/, P& target) {
+    field.expect_text("link");
+    target.side = AngleSide::kLink;
+  });
   law.finish(read_innovation_share);
   return law.kind();
 }

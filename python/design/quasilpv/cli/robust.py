@@ -205,6 +205,8 @@ def _delay(gate: RobustGate) -> str:
 
 
 def _verdict(gate: RobustGate) -> str:
+    from quasilpv.certificate.gate.proof import ON_CONDITION
+
     if gate.motion is False:
         return "NOT passed: that one Lyapunov function is common to all motions is claimed and not proved"
     if gate.passed and gate.motion:
@@ -213,7 +215,8 @@ def _verdict(gate: RobustGate) -> str:
     if gate.passed:
         lag = f", every lag of the drives of {_lags(gate)}" if gate.lag[1] > 0 else ""
         proved = f"every posture, payload{lag} and constant delay up to the specified one (frozen loop)"
-        return f"passed: proved for {proved}, {WHILE}"
+        on = f", on condition that {ON_CONDITION}" if gate.torque_controlled else ""
+        return f"passed: proved for {proved}, {WHILE}{on}"
     if gate.margin is None:
         return "NOT passed: with the specified delay the loop is not stable even with the design inertia"
     if gate.needed is None:

@@ -170,7 +170,7 @@ def synth_command(
     _refuse(of_systems, robot_id, "a system")
     source = robot_named(robot_id)
     chosen = default_controller(source) if controller is None else require_controller(controller)
-    if controller is None and chosen != DEFAULT_CONTROLLER:
+    if controller is None and getattr(source, "arm_class", "rigid") != "rigid":
         print_note(_why(source, chosen))
     request = requested(
         source,

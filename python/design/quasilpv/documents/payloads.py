@@ -138,12 +138,15 @@ class TreePayloads(PayloadsDocument):
         rotor_tolerance: the same of the rotors, one per joint.
         load: what the robot may carry; null for nothing.
         gears: one per joint, of robots whose joints give; absent for rigid ones.
+        torque_gain: of drives that control the torque in their joints, which leave this share of their rotors, 1 over
+            it; absent for others.
     """
 
     link_tolerance: Share
     rotor_tolerance: tuple[Share, ...]
     load: Load | None
     gears: tuple[Gear, ...] | None = None
+    torque_gain: Annotated[float, Field(ge=1.0)] | None = None
 
     def require_joints(self, joints: int) -> None:
         """See `PayloadsDocument.require_joints`."""

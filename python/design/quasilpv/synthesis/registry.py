@@ -148,7 +148,8 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
     "dob-acceleration": ControllerKind(
         "disturbance-observer tracking at the acceleration level, positions only (default)",
         "acceleration.law.acceleration_law",
-        in_space="acceleration.tree_law.tree_acceleration_law",
+        in_space="elastic.torque_controlled.acceleration_in_space",
+        arm_classes=("rigid", "torque-controlled"),
     ),
 }
 

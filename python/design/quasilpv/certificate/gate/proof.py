@@ -44,6 +44,8 @@ from quasilpv.certificate.robot.tree_range import TreePair, TreeWitness, tree_ra
 from quasilpv.documents.mechanism import Tree
 from quasilpv.errors import InputError
 
+ON_CONDITION = "the torque in every joint follows its command through the lag, whatever the link does"
+
 GROWTH_RATIOS = 61
 CURVE_POINTS = 41
 
@@ -76,6 +78,8 @@ class RobustGate:
         seconds_to_check: how long the proof of the needed range took.
         lag: shortest and longest time constant of the drives, common to all joints, in samples.
         condition: within which angles and speeds `motion` holds; None if it holds for all motions, or is not claimed.
+        torque_controlled: the drives are stated to control the torque in their joints: all of it is about arms whose
+            drives do, see `ON_CONDITION`.
     """
 
     loop: AccelerationLoopData
@@ -90,6 +94,7 @@ class RobustGate:
     seconds_to_check: float | None = None
     lag: Interval = NO_LAG
     condition: TreeMotion | None = None
+    torque_controlled: bool = False
 
     def __repr__(self) -> str:
         """The verdict in a line."""
@@ -161,6 +166,7 @@ class RobustGate:
             "lag_s": list(self.lag_s),
             "proved_in_motion": self.motion,
             **self._condition_document(),
+            **({"on_condition": ON_CONDITION} if self.torque_controlled else {}),
             "needed_range": None if self.needed is None else list(self.needed.to_floats()),
             "sampled_range": None if self.sampled_range is None else list(self.sampled_range),
             "worst_growth_rate_per_s": None if worst is None else worst.growth_rate_per_s,
@@ -279,6 +285,7 @@ def _tree_gate(shipped: Shipped[Any], opened: RobustGate, limits: Limits | None)
         sampled_range=found.sampled,
         seconds_to_find=witness.seconds_to_find,
         seconds_to_check=found.seconds_to_check,
+        torque_controlled=getattr(shipped.payloads, "torque_gain", None) is not None,
     )
     if found.needed is None:
         return gate

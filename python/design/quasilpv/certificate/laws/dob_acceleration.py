@@ -82,7 +82,8 @@ class DobAccelerationLaw(ChainLaw):
     """Tracking at the acceleration level with a disturbance observer, the same scalars for every joint.
 
     With ``disturbance_compensation`` false the observer runs but its filtered disturbance is not fed back.
-    ``lyapunov_bound`` is for the monitor, ``motion_limits`` for the run time (``docs/concepts/motion.md``).
+    ``lyapunov_bound`` is for the monitor, ``motion_limits`` for the run time (``docs/concepts/motion.md``);
+    ``angle_side`` is for gears whose drives control their torques.
     """
 
     DISTURBANCE = "acceleration"
@@ -91,6 +92,7 @@ class DobAccelerationLaw(ChainLaw):
         **ChainLaw.optional,
         "lyapunov_bound": "two matrices",
         "motion_limits": "limits",
+        "angle_side": '"link"',
     }
 
     kind: Literal["dob-acceleration"]
@@ -100,6 +102,7 @@ class DobAccelerationLaw(ChainLaw):
     disturbance_compensation: bool
     lyapunov_bound: LyapunovBound | None = None
     motion_limits: MotionLimits | None = None
+    angle_side: Literal["link"] | None = None
 
     def check(self, joints: int) -> None:
         """See `LawDocument.check`."""

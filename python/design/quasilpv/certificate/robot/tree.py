@@ -13,7 +13,7 @@ them from above (each vertex on its own suffices for the convex combinations).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -96,7 +96,7 @@ class TreeData:
                     raise InputError(source, f"law.inertia.joints[{k}].{field}", got, expected)
         return cls(
             joints=chain_of(robot, shipped.artifact.domain.angle_rad),
-            nominal=TreeInertia.of(robot),
+            nominal=_apparent(TreeInertia.of(robot), payloads.torque_gain),
             design=TreeInertia.of(inertia),
             link_tolerance=rational(payloads.link_tolerance),
             rotor_tolerance=tuple(rational(x) for x in payloads.rotor_tolerance),
@@ -122,6 +122,13 @@ class TreeData:
             (own * (1 + tolerance * x) - bound * design) * sign
             for own, x, design in zip(self.nominal.rotors, self.rotor_tolerance, self.design.rotors, strict=True)
         ]
+
+
+def _apparent(robot: TreeInertia, torque_gain: float | None) -> TreeInertia:
+    """What links feel: of the rotors what drives leave that control the torques in the joints."""
+    if torque_gain is None:
+        return robot
+    return replace(robot, rotors=tuple(rotor / rational(torque_gain) for rotor in robot.rotors))
 
 
 def central_load(load: Load, share: fmpq) -> fmpq_mat:

@@ -64,7 +64,7 @@ class _Disc:
 
 
 def tree_acceleration_law(
-    robot: SpatialRobot, specification: Specification, progress: Progress = no_progress
+    robot: SpatialRobot, specification: Specification, progress: Progress = no_progress, grid: Grid = GRID
 ) -> TrackingDesign:
     """Design `dob-acceleration` for a robot in space.
 
@@ -72,11 +72,12 @@ def tree_acceleration_law(
         robot: what it is for.
         specification: what is asked for; its torque activity is a share of each joint's own limit.
         progress: called with (points done, points in all).
+        grid: of the search.
 
     Raises:
         InfeasibleError: no bounds of the inertia were found, or no design meets the specification.
     """
-    return _law(robot, specification, progress, None)
+    return _law(robot, specification, progress, None, grid)
 
 
 def moving_tree_acceleration_law(
@@ -145,7 +146,11 @@ class MotionBound:
 
 
 def _law(
-    robot: SpatialRobot, specification: Specification, progress: Progress, moving: MotionBound | None
+    robot: SpatialRobot,
+    specification: Specification,
+    progress: Progress,
+    moving: MotionBound | None,
+    grid: Grid = GRID,
 ) -> TrackingDesign:
     found = find_range(robot, robot.tree)
     needed = _Range(found.lowest.bound, found.highest.bound)
@@ -161,7 +166,7 @@ def _law(
         integral=not robot.rubs,
         lag_s=robot.lag_s[1],
     )
-    best = search.run(GRID, progress)
+    best = search.run(grid, progress)
     feedback, observer = search.gains_of_best()
     kp, kd, ki = (float(gain) for gain in best.law.feedback)
     controller = DobAccelerationLaw.tag() if moving is None else "dob-moving"

@@ -107,6 +107,7 @@ class SpatialPlants:
         tool: placement of the load's frame in that of the last joint.
         lag_s: shortest and longest time constant of the drives, common to all joints.
         gears: of joints that give, one each; none for an arm with a rigid joint.
+        torque_gain: of drives that control the torque in their joints; 1: they do not.
     """
 
     link_tolerance: float
@@ -115,6 +116,7 @@ class SpatialPlants:
     tool: Placement
     lag_s: Interval = (0.0, 0.0)
     gears: tuple[ElasticDrive, ...] = ()
+    torque_gain: float = 1.0
 
     def to_document(self) -> dict[str, Any]:
         """The ``payloads`` member of an artifact."""
@@ -133,6 +135,7 @@ class SpatialPlants:
             },
             **({"lag_s": list(self.lag_s)} if self.lag_s[1] > 0.0 else {}),
             **({"gears": [_gear(drive) for drive in self.gears]} if self.gears else {}),
+            **({"torque_gain": self.torque_gain} if self.torque_gain > 1.0 else {}),
         }
 
 
@@ -206,7 +209,8 @@ class SpatialRobot:
         rotors = tuple(joint.rotor_tolerance for joint in self.joints)
         gears = tuple(joint.drive for joint in self.joints if joint.drive is not None)
         elastic = gears if len(gears) == len(self.joints) else ()
-        return SpatialPlants(self.link_uncertainty, rotors, self.payload, self.tree.tool, self.lag_s, elastic)
+        gain = TORQUE_LOOP_GAIN if elastic and all(drive.torque_loop for drive in elastic) else 1.0
+        return SpatialPlants(self.link_uncertainty, rotors, self.payload, self.tree.tool, self.lag_s, elastic, gain)
 
     def with_payload_fraction(self, fraction: float) -> TreeMechanism:
         """The nominal robot with a share of its load in [0, 1], far out: see `PayloadBody.farthest`.
