@@ -277,7 +277,7 @@ def test_when_a_design_is_proved_expect_the_artifact_alone_to_say_so() -> None:
     verdict, found = verify(artifact), gate(artifact)
     assert verdict.verified
     assert [claim.name for claim in verdict.claims][-1] == WHAT
-    assert verdict.evidence == {"exact": 2, "enclosed": 1, "sampled": 0}
+    assert verdict.evidence == {"exact": 0, "enclosed": 3, "sampled": 0}
     assert isinstance(found, ElasticGate)
     assert found.passed
     assert found.delay_margin_s == pytest.approx(T / 2.0)

@@ -1,7 +1,7 @@
 """The law `motor-pid`: PID of the motors of elastic joints, the inverse dynamics of the links fed forward.
 
 An artifact with a witness claims the stability of its frozen loop, correction included, for every arm it states and
-every delay up to that of the witness: the chain certificate of the links, exact, and the exclusion of
+every delay up to that of the witness: the chain certificate of the links and the exclusion of
 `quasilpv.certificate.gate.two_mass`, in ball arithmetic. One without a witness claims nothing: its design was looked at
 on a grid of postures, loads and stiffnesses (`quasilpv.synthesis.elastic`).
 """
@@ -87,8 +87,8 @@ def claims(shipped: Shipped[MotorPidLaw]) -> Iterator[Claim]:
     low, high = found.links.sides
     least, most = found.links.sampled
     lowest, highest = to_float(low.bound), to_float(high.bound)
-    yield Claim("links: at least m1 rotors", low.proof.holds and lowest > 0.0, 1.0 - lowest / least, Evidence.EXACT)
-    yield Claim("links: at most m2 rotors", high.proof.holds, 1.0 - most / highest, Evidence.EXACT)
+    yield Claim.enclosed("links: at least m1 rotors", low.proof.holds and lowest > 0.0, 1.0 - lowest / least)
+    yield Claim.enclosed("links: at most m2 rotors", high.proof.holds, 1.0 - most / highest)
     yield Claim.enclosed(WHAT, found.passed, -1.0 if found.exclusion is None else found.exclusion.spare)
 
 
