@@ -304,7 +304,7 @@ inline Json law_table(const std::string& kind, const TestArm& arm) {
                 {"friction_coulomb_nm", repeated(1.0)},
                 {"dead_zone_rad", 2e-5}});
   } else if (kind == "link-damped") {  // likewise
-    law.update({{"feedback", {{"kp", -225.0}, {"kd", -30.0}, {"ki", 0.0}}},
+    law.update({{"feedback", {{"kp", -31500.0}, {"kd", -700.0}, {"ki", 0.0}}},
                 {"observer", {0.9, 600.0, 150000.0, 1.5e7}},
                 {"filter_time_constant_s", 0.01},
                 {"inertia_scale", 0.8},
