@@ -47,7 +47,8 @@ def test_of_a_linear_plant_the_proof_ends_where_the_sampled_loop_does() -> None:
 def test_the_sharper_period_is_many_times_that_of_euler_and_runs_keep_the_region() -> None:
     artifact, rng = released("boost"), np.random.default_rng(7)
     assert artifact.sampling is not None
-    assert artifact.sampling["method"] == "linearised"
+    assert artifact.sampling is not None
+    assert artifact.sampling.method == "linearised"
     proved = artifact.sample_period_s
     assert SampledLoop(artifact, 400).bound.longest_period_s < 0.3 * proved
     starts = [on_the_border(artifact, rng) for _ in range(30)]

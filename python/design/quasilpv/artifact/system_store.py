@@ -10,7 +10,7 @@ import numpy as np
 from quasilpv.artifact.store import CBOR_NAME, JSON_NAME
 from quasilpv.documents.canonical import canonical_cbor, canonical_json, parse_document
 from quasilpv.documents.strict_model import validate
-from quasilpv.documents.system_artifact import SCHEMA, SystemArtifactDocument
+from quasilpv.documents.system_artifact import SAMPLING_METHODS, SCHEMA, SystemArtifactDocument
 from quasilpv.files import read_bytes, write_atomically
 
 
@@ -36,7 +36,7 @@ def read_system_artifact(path: Path | str) -> SystemArtifactDocument | None:
     if document.get("schema") != SCHEMA:
         return None
     content = {key: value for key, value in document.items() if key != "hash"}
-    return validate(SystemArtifactDocument, content, str(path))
+    return validate(SystemArtifactDocument, content, str(path), SAMPLING_METHODS)
 
 
 def system_summary(artifact: SystemArtifactDocument) -> dict[str, Any]:
@@ -75,7 +75,7 @@ def system_summary(artifact: SystemArtifactDocument) -> dict[str, Any]:
             "jacobian": sum(len(row.code) for row in artifact.plant.jacobian),
         },
         **({} if artifact.l2_gain is None else {"l2_gain": artifact.l2_gain[0], "energy_s": artifact.l2_gain[1]}),
-        "sampling": artifact.sampling or "not proved",
+        "sampling": "not proved" if artifact.sampling is None else artifact.sampling.model_dump(mode="json"),
         "verification": artifact.verification,
     }
 

@@ -115,6 +115,28 @@ class PlantDocument(StrictModel):
     jacobian: tuple[Program, ...]
 
 
+class EulerSampling(StrictModel):
+    """The sampling period is proved by Euler's bound: the loop's speed, and how fast the slope of the plant grows."""
+
+    method: Literal["euler"]
+    speed_per_s: NonNegative
+    lipschitz_per_s: NonNegative
+    longest_period_s: Positive
+
+
+class LinearisedSampling(StrictModel):
+    """The sampling period is proved by the loop linearised at every sample: growth and curvature of the plant."""
+
+    method: Literal["linearised"]
+    growth_per_s: NonNegative
+    curvature_per_s: NonNegative
+    longest_period_s: Positive
+
+
+SAMPLING_METHODS = ("euler", "linearised")
+SamplingDocument = Annotated[EulerSampling | LinearisedSampling, Field(discriminator="method")]
+
+
 class SystemArtifactDocument(StrictModel):
     """One controller of a general system, immutable. The hash is not stored; it is computed from the content."""
 
@@ -130,7 +152,7 @@ class SystemArtifactDocument(StrictModel):
     region: RegionDocument
     plant: PlantDocument
     witness: dict[str, Rows]
-    sampling: dict[str, float | str | None] | None
+    sampling: SamplingDocument | None
     verification: dict[str, object] | None
 
     def of(self, role: Role) -> tuple[Signal, ...]:

@@ -16,7 +16,14 @@ from quasilpv.artifact.plant_program import plant_document
 from quasilpv.documents.canonical import document_hash
 from quasilpv.documents.programs import Program
 from quasilpv.documents.strict_model import validate
-from quasilpv.documents.system_artifact import DISTURBANCE, PERFORMANCE, SCHEMA, SystemArtifactDocument
+from quasilpv.documents.system_artifact import (
+    DISTURBANCE,
+    PERFORMANCE,
+    SAMPLING_METHODS,
+    SCHEMA,
+    SamplingDocument,
+    SystemArtifactDocument,
+)
 from quasilpv.synthesis.regional.feedback import RegionalDesign
 from quasilpv.synthesis.regional.request import RegionalRequest
 from quasilpv.systems.descriptor.premise import AffineMatrix, PremiseKind
@@ -24,7 +31,7 @@ from quasilpv.systems.descriptor.system import DescriptorSystem
 
 
 def artifact_of(
-    design: RegionalDesign, sampling: dict[str, Any] | None = None, verification: dict[str, Any] | None = None
+    design: RegionalDesign, sampling: SamplingDocument | None = None, verification: dict[str, Any] | None = None
 ) -> SystemArtifactDocument:
     """The artifact of a design.
 
@@ -79,10 +86,10 @@ def artifact_of(
             **{name: value.tolist() for name, value in design.witness.items()},
             **{name: [list(request.sizes(own))] for name, own in performance.items() if own},
         },
-        "sampling": sampling,
+        "sampling": None if sampling is None else sampling.model_dump(mode="json"),
         "verification": verification,
     }
-    return validate(SystemArtifactDocument, document, system.name)
+    return validate(SystemArtifactDocument, document, system.name, SAMPLING_METHODS)
 
 
 def _symmetric(P: FloatArray) -> list[list[float]]:

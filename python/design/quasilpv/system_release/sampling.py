@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 from quasilpv.certificate.exact.trigonometric import UnsupportedError
-from quasilpv.certificate.systems.linearised import LINEARISED, LinearisedLoop
+from quasilpv.certificate.systems.linearised import LinearisedLoop
 from quasilpv.certificate.systems.sampled import SampledBound, SampledLoop
+from quasilpv.documents.system_artifact import EulerSampling, LinearisedSampling, SamplingDocument
 from quasilpv.synthesis.regional.feedback import RegionalDesign
 from quasilpv.system_release.document import artifact_of
 
@@ -79,23 +79,23 @@ class Sampled:
         return period <= self.sharper_s or (self.bound is not None and period < self.bound.longest_period_s)
 
     @property
-    def sampling(self) -> dict[str, Any] | None:
+    def sampling(self) -> SamplingDocument | None:
         """The member of the artifact; None if the period is not proved."""
         if self.bound is None or not self.proved:
             return None
         if self.sharper is not None and self.design.request.sample_period_s >= self.bound.longest_period_s:
-            return {
-                "method": LINEARISED,
-                "growth_per_s": self.sharper.growth,
-                "curvature_per_s": self.sharper.curvature,
-                "longest_period_s": self.sharper_s,
-            }
-        return {
-            "method": "euler",
-            "speed_per_s": self.bound.speed,
-            "lipschitz_per_s": self.bound.lipschitz,
-            "longest_period_s": self.bound.longest_period_s,
-        }
+            return LinearisedSampling(
+                method="linearised",
+                growth_per_s=self.sharper.growth,
+                curvature_per_s=self.sharper.curvature,
+                longest_period_s=self.sharper_s,
+            )
+        return EulerSampling(
+            method="euler",
+            speed_per_s=self.bound.speed,
+            lipschitz_per_s=self.bound.lipschitz,
+            longest_period_s=self.bound.longest_period_s,
+        )
 
 
 def _is_proved(loop: LinearisedLoop, period_s: float) -> bool:

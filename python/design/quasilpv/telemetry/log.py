@@ -23,7 +23,7 @@ from quasilpv.artifact import Artifact
 from quasilpv.defaults import LAST
 from quasilpv.documents.canonical import canonical_json, parse_document, parse_strict_json
 from quasilpv.documents.strict_model import StrictModel, validate
-from quasilpv.documents.system_artifact import SystemArtifactDocument
+from quasilpv.documents.system_artifact import SAMPLING_METHODS, SystemArtifactDocument
 from quasilpv.errors import InputError
 from quasilpv.files import write_atomically
 from quasilpv.scenarios import Scenario, SystemScenario
@@ -161,7 +161,7 @@ class RunLog:
         source = f"{self.source}: {ARTIFACT}"
         document = parse_document(self._document(ARTIFACT), source)
         content = {key: value for key, value in document.items() if key != "hash"}
-        artifact = validate(SystemArtifactDocument, content, source)
+        artifact = validate(SystemArtifactDocument, content, source, SAMPLING_METHODS)
         self._require_hash(artifact.name, artifact.hash)
         return artifact
 

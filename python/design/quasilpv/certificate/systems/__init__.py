@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 
 from quasilpv.certificate.exact.claims import Verification
-from quasilpv.certificate.systems.linearised import LINEARISED, LinearisedLoop
+from quasilpv.certificate.systems.linearised import LinearisedLoop
 from quasilpv.certificate.systems.regional import regional_claims
 from quasilpv.certificate.systems.sampled import SampledLoop
 from quasilpv.documents.strict_model import FieldError
-from quasilpv.documents.system_artifact import SystemArtifactDocument
+from quasilpv.documents.system_artifact import LinearisedSampling, SystemArtifactDocument
 from quasilpv.errors import InputError
 
 __all__ = ["verify_system"]
@@ -29,7 +29,7 @@ def verify_system(artifact: SystemArtifactDocument, source: str = "artifact") ->
     try:
         claims = tuple(regional_claims(artifact))
         if artifact.sampling is not None:
-            loop = LinearisedLoop if artifact.sampling.get("method") == LINEARISED else SampledLoop
+            loop = LinearisedLoop if isinstance(artifact.sampling, LinearisedSampling) else SampledLoop
             claims = (*claims, loop(artifact).claim(artifact.sample_period_s))
     except FieldError as error:
         raise InputError(source, error.field, error.got, error.expected) from error

@@ -35,9 +35,6 @@ from quasilpv.certificate.systems.balls import beside, is_below, largest_eigenva
 from quasilpv.certificate.systems.cells import Box, Cells, halves, widest
 from quasilpv.documents.system_artifact import SystemArtifactDocument
 
-LINEARISED = "linearised"
-"""The method, as artifacts name it."""
-
 CELLS = 6000
 """At most as many cells of samples are looked at."""
 

@@ -67,7 +67,7 @@ def link_damped(robot: SpatialRobot, specification: Specification, progress: Pro
         InputError: a joint is rigid, has encoders on one side only, or rings above the loop's lead undamped.
         InfeasibleError: no choice of gains is stable on the whole grid.
     """
-    drives = elastic_drives(robot, "link-damped", ("both",))
+    drives = elastic_drives(robot, LinkDampedLaw.tag(), ("both",))
     reach = Reach.of(robot, specification)
     arms = list(grid_arms(robot, drives, POSTURES))
     inertias = robot.tree.inertia(np.array([arm.posture for arm in arms]))

@@ -86,7 +86,7 @@ def motor_pid(robot: SpatialRobot, specification: Specification, progress: Progr
         InputError: a joint is rigid, its encoder is on the link only, or a gear rings above the loop's lead undamped.
         InfeasibleError: no choice of gains is stable on the whole grid.
     """
-    drives = elastic_drives(robot, "motor-pid", ("motor", "both"))
+    drives = elastic_drives(robot, MotorPidLaw.tag(), ("motor", "both"))
     try:
         reach = Reach.of(robot, specification)
     except InputError as error:
@@ -135,7 +135,7 @@ def _least_damping(robot: SpatialRobot, specification: Specification) -> float |
             if (drive := joint.drive) is not None
         )
         damped = replace(robot, joints=joints)
-        drives = elastic_drives(damped, "motor-pid", ("motor", "both"))
+        drives = elastic_drives(damped, MotorPidLaw.tag(), ("motor", "both"))
         laws = _laws(damped, drives, specification.sample_period_s).values()
         if any(_excluded(damped, law, witness or {}, specification).proved for law in laws):
             return damping_s
@@ -239,7 +239,7 @@ def _design(
     }
     gears = [
         {"stiffness_nm_rad": list(drive.stiffness_nm_rad), "damping_least_s": drive.damping_least_s}
-        for drive in elastic_drives(robot, "motor-pid", ("motor", "both"))
+        for drive in elastic_drives(robot, MotorPidLaw.tag(), ("motor", "both"))
     ]
     return TrackingDesign(
         controller=MotorPidLaw.tag(),

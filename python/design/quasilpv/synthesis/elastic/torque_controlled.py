@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from quasilpv.certificate.gate.proof import ON_CONDITION
+from quasilpv.certificate.laws.dob_acceleration import DobAccelerationLaw
 from quasilpv.errors import InfeasibleError
 from quasilpv.loops.link_loop import LinkLaw, link_growth_rate
 from quasilpv.progress import Progress, no_progress
@@ -69,7 +70,7 @@ def acceleration_in_space(
     """
     if robot.arm_class is not ArmClass.TORQUE_CONTROLLED:
         return tree_acceleration_law(robot, specification, progress)
-    elastic_drives(robot, "dob-acceleration", SIDES)
+    elastic_drives(robot, DobAccelerationLaw.tag(), SIDES)
     stiff, rates = as_rigid(robot), []
     for tried, choice in enumerate(CHOICES):
         made = tree_acceleration_law(stiff, specification, grid=choice.grid(specification.sample_period_s))
@@ -143,7 +144,7 @@ def _growth_rates(
         inertia_scale=float(design.report["inertia_scale"]),
         relative_damping=np.zeros(len(robot.joints)),
     )
-    drives = elastic_drives(robot, "dob-acceleration", SIDES)
+    drives = elastic_drives(robot, DobAccelerationLaw.tag(), SIDES)
     arms = list(grid_arms(replace(robot, lag_s=(0.0, 0.0)), drives, POSTURES))
     inertias = stiff.tree.inertia(np.array([arm.posture for arm in arms]))
     for arm, inertia in zip(arms, inertias, strict=True):
