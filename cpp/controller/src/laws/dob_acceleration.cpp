@@ -1,20 +1,13 @@
 // The default law: feedback, disturbance observer and prediction in acceleration coordinates.
-#include "laws/common/law_table.hpp"
-#include "laws/common/observer_law.hpp"
+#include "laws/common/acceleration_law.hpp"
 
 namespace quasilpv {
 namespace {
 
 /// Scalars of the sampled law, the same for every joint. Errors are x - x_r: stabilising kp, kd and ki are negative.
 struct DobAccelerationParameters final : ObserverParameters {
-  struct Feedback {
-    double kp = 0.0;  ///< 1/s^2
-    double kd = 0.0;  ///< 1/s
-    double ki = 0.0;  ///< 1/s^3
-  };
-
-  Feedback feedback;
-  std::array<double, 4> observer{};      ///< l1 (1), l2 (1/s), l3 (1/s^2), l4 (1/s^3)
+  AccelerationFeedback feedback;
+  ObserverGains observer{};
   bool disturbance_compensation = true;  ///< false: observed and predicted, but not subtracted
   std::optional<LyapunovBound> bound;    ///< none: not designed for one
   std::optional<MotionLimits> limits;    ///< none: the proof does not depend on the motion
@@ -40,21 +33,13 @@ struct DobAccelerationParameters final : ObserverParameters {
 /// Start and samples without a measurement: see ObserverLaw. Coriolis torque is part of the disturbance.
 /// Source: Dehak 2022, section IV.3, carried over to accelerations and discrete time.
 template <int N>
-class DobAccelerationLaw final : public ObserverLaw<N> {
+class DobAccelerationLaw final : public AccelerationLaw<N> {
  public:
   DobAccelerationLaw(const DobAccelerationParameters& parameters, const LawSettings& settings)
-      : ObserverLaw<N>(parameters, settings), parameters_(parameters) {}
+      : AccelerationLaw<N>(parameters, parameters.observer, settings), parameters_(parameters) {}
 
  private:
-  using typename ObserverLaw<N>::Motion;
-
-  void correct(const JointVector<N>& measured, StepReport& /*report*/, ObserverState<N>& state) noexcept override {
-    const JointVector<N> innovation = measured - state.angle;
-    state.angle += parameters_.observer[0] * innovation;
-    state.speed += parameters_.observer[1] * innovation;
-    state.disturbance += parameters_.observer[2] * innovation;
-    state.disturbance_rate += parameters_.observer[3] * innovation;
-  }
+  using typename AccelerationLaw<N>::Motion;
 
   Command<N> control(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& reference,
                      StepReport& /*report*/) noexcept override {
@@ -92,15 +77,6 @@ class DobAccelerationLaw final : public ObserverLaw<N> {
 
 std::unique_ptr<ControlLaw> DobAccelerationParameters::make_law(const LawSettings& settings) const {
   return make_law_of_size<DobAccelerationLaw>(*this, settings);
-}
-
-MemberTable<DobAccelerationParameters::Feedback> feedback_table() {
-  using F = DobAccelerationParameters::Feedback;
-  MemberTable<F> feedback;
-  feedback.number("kp", &F::kp);
-  feedback.number("kd", &F::kd);
-  feedback.number("ki", &F::ki);
-  return feedback;
 }
 
 MemberTable<LyapunovBound> bound_table() {

@@ -1,28 +1,20 @@
 // The default law on the angles of elastic links, with the inverse dynamics fed forward and the gears damped.
-#include "laws/common/law_table.hpp"
-#include "laws/common/observer_law.hpp"
+#include "laws/common/acceleration_law.hpp"
+#include "laws/common/link_feedforward.hpp"
 
 namespace quasilpv {
 namespace {
 
-constexpr double kCoulombSpeed = 0.01;  // w_0, rad/s: friction is not fed forward at once where the reference turns
-
 /// Scalars of the sampled law, the same for every joint. Errors are x - x_r: stabilising kp, kd and ki are negative.
 struct LinkDampedParameters final : ObserverParameters {
-  struct Feedback {
-    double kp = 0.0;  ///< 1/s^2
-    double kd = 0.0;  ///< 1/s
-    double ki = 0.0;  ///< 1/s^3
-  };
-
-  Feedback feedback;
-  std::array<double, 4> observer{};  ///< l1 (1), l2 (1/s), l3 (1/s^2), l4 (1/s^3)
-  double inertia_scale = 1.0;        ///< s: of the chain's inertia, in the feedback
-  JointArray rotor_inertia{};        ///< B, kg m^2, reflected to the joints
-  JointArray stiffness{};            ///< K of the gears, N m/rad
-  JointArray relative_damping{};     ///< D_s of the gears by the motors, N m s/rad
-  JointArray viscous{};              ///< of the motors, N m s/rad, as far as it is known
-  JointArray coulomb{};              ///< likewise, N m
+  AccelerationFeedback feedback;
+  ObserverGains observer{};
+  double inertia_scale = 1.0;     ///< s: of the chain's inertia, in the feedback
+  JointArray rotor_inertia{};     ///< B, kg m^2, reflected to the joints
+  JointArray stiffness{};         ///< K of the gears, N m/rad
+  JointArray relative_damping{};  ///< D_s of the gears by the motors, N m s/rad
+  JointArray viscous{};           ///< of the motors, N m s/rad, as far as it is known
+  JointArray coulomb{};           ///< likewise, N m
 
   AngleSide controlled_side() const noexcept override { return AngleSide::kLink; }
   std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
@@ -45,19 +37,18 @@ struct LinkDampedParameters final : ObserverParameters {
 /// Source: Spong 1987, Modeling and control of elastic joint robots; De Luca and Book 2016, Springer Handbook of
 /// Robotics, section 11.1.
 template <int N>
-class LinkDampedLaw final : public ObserverLaw<N> {
+class LinkDampedLaw final : public AccelerationLaw<N> {
  public:
   LinkDampedLaw(const LinkDampedParameters& parameters, const LawSettings& settings)
-      : ObserverLaw<N>(parameters, settings),
+      : AccelerationLaw<N>(parameters, parameters.observer, settings),
         parameters_(parameters),
+        feedforward_(parameters.model, parameters.viscous, parameters.coulomb),
         rotor_(from_array<N>(parameters.rotor_inertia)),
         stiffness_(from_array<N>(parameters.stiffness)),
-        damping_per_sample_(from_array<N>(parameters.relative_damping) / settings.sample_period_s),
-        viscous_(from_array<N>(parameters.viscous)),
-        coulomb_(from_array<N>(parameters.coulomb)) {}
+        damping_per_sample_(from_array<N>(parameters.relative_damping) / settings.sample_period_s) {}
 
  private:
-  using typename ObserverLaw<N>::Motion;
+  using typename AccelerationLaw<N>::Motion;
 
   void begin() noexcept override { was_wound_ = false; }
 
@@ -67,8 +58,7 @@ class LinkDampedLaw final : public ObserverLaw<N> {
   }
 
   ReferenceVectors<N> shape(const ReferenceVectors<N>& reference) noexcept override {
-    parameters_.model.tree->inverse_dynamics(reference.angle.data(), reference.speed.data(),
-                                             reference.acceleration.data(), fed_forward_.data());
+    fed_forward_ = feedforward_.dynamics(reference);
     const JointVector<N> foreseen =
         (fed_forward_ - rotor_.cwiseProduct(reference.acceleration)).cwiseQuotient(stiffness_);
     damping_.setZero();
@@ -80,17 +70,8 @@ class LinkDampedLaw final : public ObserverLaw<N> {
       before_ = unforeseen;
     }
     was_wound_ = sensed_;
-    fed_forward_ += viscous_.cwiseProduct(reference.speed) +
-                    coulomb_.cwiseProduct((reference.speed / kCoulombSpeed).array().tanh().matrix());
+    fed_forward_ += feedforward_.friction(reference.speed);
     return reference;
-  }
-
-  void correct(const JointVector<N>& measured, StepReport& /*report*/, ObserverState<N>& state) noexcept override {
-    const JointVector<N> innovation = measured - state.angle;
-    state.angle += parameters_.observer[0] * innovation;
-    state.speed += parameters_.observer[1] * innovation;
-    state.disturbance += parameters_.observer[2] * innovation;
-    state.disturbance_rate += parameters_.observer[3] * innovation;
   }
 
   Command<N> control(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& reference,
@@ -120,11 +101,10 @@ class LinkDampedLaw final : public ObserverLaw<N> {
   }
 
   LinkDampedParameters parameters_;
+  LinkFeedforward<N> feedforward_;
   JointVector<N> rotor_;
   JointVector<N> stiffness_;
-  JointVector<N> damping_per_sample_;  // D_s / T
-  JointVector<N> viscous_;
-  JointVector<N> coulomb_;
+  JointVector<N> damping_per_sample_;                    // D_s / T
   JointVector<N> fed_forward_ = JointVector<N>::Zero();  // F
   JointVector<N> fed_back_ = JointVector<N>::Zero();     // a
   JointVector<N> damping_ = JointVector<N>::Zero();      // torque of this sample
@@ -136,21 +116,6 @@ class LinkDampedLaw final : public ObserverLaw<N> {
 
 std::unique_ptr<ControlLaw> LinkDampedParameters::make_law(const LawSettings& settings) const {
   return make_law_of_size<LinkDampedLaw>(*this, settings);
-}
-
-MemberTable<LinkDampedParameters::Feedback> feedback_table() {
-  using F = LinkDampedParameters::Feedback;
-  MemberTable<F> feedback;
-  feedback.number("kp", &F::kp);
-  feedback.number("kd", &F::kd);
-  feedback.number("ki", &F::ki);
-  return feedback;
-}
-
-void require_chain(const Field& law, LinkDampedParameters& parameters) {
-  if (!parameters.model.tree) {
-    law["inertia"].fail("a table", "a chain of bodies, whose inverse dynamics is fed forward");
-  }
 }
 
 }  // namespace
@@ -169,7 +134,7 @@ LawKind link_damped() {
   law.joint_values("relative_damping_nm_s", &P::relative_damping);
   law.joint_values("friction_viscous_nm_s", &P::viscous);
   law.joint_values("friction_coulomb_nm", &P::coulomb);
-  law.finish(require_chain);
+  law.finish(require_chain<P>);
   return law.kind();
 }
 

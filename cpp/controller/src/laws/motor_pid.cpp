@@ -1,11 +1,9 @@
 // PID of the motors of elastic joints, with the inverse dynamics of the links fed forward.
-#include "laws/common/law_table.hpp"
-#include "laws/common/observer_law.hpp"
+#include "laws/common/acceleration_law.hpp"
+#include "laws/common/link_feedforward.hpp"
 
 namespace quasilpv {
 namespace {
-
-constexpr double kCoulombSpeed = 0.01;  // w_0, rad/s: friction is not fed forward at once where the reference turns
 
 /// What the correction of the motors' reference is told by.
 enum class CorrectionSource : std::uint8_t {
@@ -16,16 +14,10 @@ enum class CorrectionSource : std::uint8_t {
 
 /// Scalars of the sampled law, the same for every joint. Errors are x - x_r: stabilising kp, kd and ki are negative.
 struct MotorPidParameters final : ObserverParameters {
-  struct Feedback {
-    double kp = 0.0;  ///< 1/s^2
-    double kd = 0.0;  ///< 1/s
-    double ki = 0.0;  ///< 1/s^3
-  };
-
   MotorPidParameters() { filter_time_constant_s = 1.0; }  // of a disturbance that nothing feeds back
 
-  Feedback feedback;
-  std::array<double, 4> observer{};   ///< l1 (1), l2 (1/s), l3 (1/s^2), l4 (1/s^3)
+  AccelerationFeedback feedback;
+  ObserverGains observer{};
   JointArray rotor_inertia{};         ///< B, kg m^2, reflected to the joints
   JointArray stiffness{};             ///< K of the gears, N m/rad
   double correction_bandwidth = 0.0;  ///< of the reference's correction, rad/s; 0: none
@@ -59,19 +51,18 @@ struct MotorPidParameters final : ObserverParameters {
 /// Source: Spong 1987, Modeling and control of elastic joint robots; De Luca and Book 2016, Springer Handbook of
 /// Robotics, section 11.1 (feedforward by the rigid inverse dynamics, elastic reference of the motors).
 template <int N>
-class MotorPidLaw final : public ObserverLaw<N> {
+class MotorPidLaw final : public AccelerationLaw<N> {
  public:
   MotorPidLaw(const MotorPidParameters& parameters, const LawSettings& settings)
-      : ObserverLaw<N>(parameters, settings),
+      : AccelerationLaw<N>(parameters, parameters.observer, settings),
         parameters_(parameters),
+        feedforward_(parameters.model, parameters.viscous, parameters.coulomb),
         rotor_(from_array<N>(parameters.rotor_inertia)),
         stiffness_(from_array<N>(parameters.stiffness)),
-        viscous_(from_array<N>(parameters.viscous)),
-        coulomb_(from_array<N>(parameters.coulomb)),
         correction_pole_(std::exp(-parameters.correction_bandwidth * settings.sample_period_s)) {}
 
  private:
-  using typename ObserverLaw<N>::Motion;
+  using typename AccelerationLaw<N>::Motion;
   using Away = Eigen::Array<bool, N, 1>;
 
   /// Which motors are farther from their reference than the dead zone; all, without one.
@@ -97,22 +88,12 @@ class MotorPidLaw final : public ObserverLaw<N> {
   }
 
   ReferenceVectors<N> shape(const ReferenceVectors<N>& reference) noexcept override {
-    parameters_.model.tree->inverse_dynamics(reference.angle.data(), reference.speed.data(),
-                                             reference.acceleration.data(), fed_forward_.data());
+    fed_forward_ = feedforward_.dynamics(reference);
     ReferenceVectors<N> motors = reference;
     foreseen_ = fed_forward_.cwiseQuotient(stiffness_);
     motors.angle += foreseen_ + correction_;
-    fed_forward_ += viscous_.cwiseProduct(reference.speed) +
-                    coulomb_.cwiseProduct((reference.speed / kCoulombSpeed).array().tanh().matrix());
+    fed_forward_ += feedforward_.friction(reference.speed);
     return motors;
-  }
-
-  void correct(const JointVector<N>& measured, StepReport& /*report*/, ObserverState<N>& state) noexcept override {
-    const JointVector<N> innovation = measured - state.angle;
-    state.angle += parameters_.observer[0] * innovation;
-    state.speed += parameters_.observer[1] * innovation;
-    state.disturbance += parameters_.observer[2] * innovation;
-    state.disturbance_rate += parameters_.observer[3] * innovation;
   }
 
   Command<N> control(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& reference,
@@ -145,10 +126,9 @@ class MotorPidLaw final : public ObserverLaw<N> {
   }
 
   MotorPidParameters parameters_;
+  LinkFeedforward<N> feedforward_;
   JointVector<N> rotor_;
   JointVector<N> stiffness_;
-  JointVector<N> viscous_;
-  JointVector<N> coulomb_;
   double correction_pole_;
   JointVector<N> fed_forward_ = JointVector<N>::Zero();  // tau_r and friction
   JointVector<N> foreseen_ = JointVector<N>::Zero();     // K^-1 tau_r
@@ -160,15 +140,6 @@ class MotorPidLaw final : public ObserverLaw<N> {
 
 std::unique_ptr<ControlLaw> MotorPidParameters::make_law(const LawSettings& settings) const {
   return make_law_of_size<MotorPidLaw>(*this, settings);
-}
-
-MemberTable<MotorPidParameters::Feedback> feedback_table() {
-  using F = MotorPidParameters::Feedback;
-  MemberTable<F> feedback;
-  feedback.number("kp", &F::kp);
-  feedback.number("kd", &F::kd);
-  feedback.number("ki", &F::ki);
-  return feedback;
 }
 
 CorrectionSource read_source(const Field& field) {
@@ -183,12 +154,6 @@ CorrectionSource read_source(const Field& field) {
     field.fail_choice({"motor-torque", "joint-torque", "deflection"});
   }
   return CorrectionSource::kDeflection;
-}
-
-void require_chain(const Field& law, MotorPidParameters& parameters) {
-  if (!parameters.model.tree) {
-    law["inertia"].fail("a table", "a chain of bodies, whose inverse dynamics is fed forward");
-  }
 }
 
 }  // namespace
@@ -208,7 +173,7 @@ LawKind motor_pid() {
   law.joint_values("friction_viscous_nm_s", &P::viscous);
   law.joint_values("friction_coulomb_nm", &P::coulomb);
   law.non_negative("dead_zone_rad", &P::dead_zone);
-  law.finish(require_chain);
+  law.finish(require_chain<P>);
   return law.kind();
 }
 
