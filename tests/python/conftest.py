@@ -1,5 +1,7 @@
 """Settings every Python test shares."""
 
+import signal
+
 import matplotlib
 import pytest
 from hypothesis import settings
@@ -13,3 +15,7 @@ settings.load_profile("quick")
 
 # The helpers of the tests with real processes hold fixtures and assertions.
 pytest.register_assert_rewrite("two_processes", "reference.logged_run")
+
+# A shell starts what runs in its background deaf to Ctrl-C, and so are then the processes of the tests about it.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from quasilpv.cli import run
 from quasilpv.conditions.forms.cube import cube_sum
-from quasilpv.errors import InputError
+from quasilpv.errors import ClaimError, InfeasibleError, InputError, PlantError, QuasilpvError
 from quasilpv.lmi import Problem, Variable
 from quasilpv.lmi.compiled import CompiledProblem
 from quasilpv.lmi.exact import rank_factors, to_rational
@@ -152,9 +152,21 @@ def test_when_the_code_has_changed_expect_stale_results_computed_again_and_dropp
     assert [kept["id"] for kept in json.loads((tmp_path / "results.json").read_text())] == ["fig-0.0"]
 
 
-def test_when_an_item_is_refused_expect_the_others_computed_and_one_line_that_names_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "refusal",
+    [
+        InputError("design", "slew", "250", "at least 317"),
+        ClaimError("not released: slew 250, needed at least 317"),
+        InfeasibleError("no gains: at least 317"),
+        PlantError("IDA: at least 317"),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_when_an_item_is_refused_expect_the_others_computed_and_one_line_that_names_it(
+    refusal: QuasilpvError, tmp_path: Path
+) -> None:
     def refuses(_: Effort) -> Finding:
-        raise InputError("design", "slew", "250", "at least 317")
+        raise refusal
 
     refused = replace(an_item(refuses), id="fig-0.1")
     after = replace(an_item(lambda _: finding(True)), id="fig-0.2")

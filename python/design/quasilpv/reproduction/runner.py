@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from quasilpv.defaults import DEFAULT_FORMATS
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, QuasilpvError
 from quasilpv.figures.style import save
 from quasilpv.files import write_atomically, write_readable_json
 from quasilpv.reproduction.item import Effort, Item, ItemResult
@@ -46,7 +46,7 @@ def reproduce(
     Raises:
         InputError: the folder cannot be written; or items were refused, after all the others have been computed.
     """
-    refused: dict[str, InputError] = {}
+    refused: dict[str, QuasilpvError] = {}
     rows: list[Mapping[str, Any]] = []
     code = _code_digest()
     stamp = {"effort": effort.value, "code": code, "formats": [*formats]}
@@ -56,7 +56,7 @@ def reproduce(
         row = _kept(out / f"{one.id}.json", effort, code, formats)
         try:
             row = row or {**_computed(one, effort, out, formats), **stamp}
-        except InputError as error:
+        except QuasilpvError as error:
             refused[one.id] = error  # the others do not depend on it
         else:
             write_readable_json(out / f"{one.id}.json", row)

@@ -169,7 +169,7 @@ class SampledLoop:
     def open_loop(self, phase: FloatArray, radius: float = 1.0) -> ComplexArray:
         """Loop transfer L at ``z = radius e^{j phase}`` per unit mu: there is a pole at z where ``mu L = 1``."""
         whole, late = self._delay
-        z = radius * np.exp(1j * phase)
+        z: ComplexArray = np.asarray(radius * np.exp(1j * phase), dtype=complex)
         shift = z - 1.0
         position = (1.0 - late) ** 2 / 2 + (late - late**2 / 2) / z
         speed = (1.0 - late) + late / z
