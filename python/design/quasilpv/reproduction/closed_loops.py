@@ -25,7 +25,7 @@ from quasilpv.experiments.track import track
 from quasilpv.scenarios import Sensors, tracking_experiment
 from quasilpv.synthesis import DesignRequest, Specification
 from quasilpv.systems.robots.arms import PlanarSerialArm
-from quasilpv.systems.robots.registry import Robot
+from quasilpv.systems.robots.registry import AnyRobot, Robot
 
 PlantName: TypeAlias = Literal["nominal", "perturbed", "chapter-III"]
 Observer: TypeAlias = Literal["whole", "without compensation", "without disturbance"]
@@ -52,6 +52,7 @@ class ClosedLoop:
         sensors: what is measured.
         observer: ``whole``; ``without compensation``, the disturbance estimated but not fed back; ``without
             disturbance``, an observer of angles and speeds only.
+        slew_scale: the slew limits of the robot times this; the source states none.
     """
 
     scenario: str
@@ -60,6 +61,7 @@ class ClosedLoop:
     plant: PlantName = "perturbed"
     sensors: Sensors = SENSORS
     observer: Observer = "whole"
+    slew_scale: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,7 @@ def outcome(loop: ClosedLoop) -> Outcome:
     experiment = tracking_experiment(loop.scenario)
     artifact = kept_design(
         DesignRequest.of(
-            experiment.robot.id,
+            _with_drives(experiment.robot, loop.slew_scale),
             loop.controller,
             Specification(
                 rate_hz=loop.rate_hz, disturbance_frequency_rad_s=experiment.robot.disturbance_frequency_rad_s
@@ -128,6 +130,14 @@ def outcome(loop: ClosedLoop) -> Outcome:
     with TemporaryDirectory() as folder:
         result = track(RunSetup(experiment, artifact, plant=plant, sensors=loop.sensors, variant=variant), Path(folder))
     return Outcome(loop, artifact, result)
+
+
+def _with_drives(robot: AnyRobot, slew_scale: float) -> AnyRobot:
+    if slew_scale == 1.0:
+        return robot
+    assert isinstance(robot, Robot)
+    slew = tuple(slew_scale * own for own in robot.limits.slew_nm_per_s)
+    return replace(robot, limits=replace(robot.limits, slew_nm_per_s=slew))
 
 
 def described(outcomes: Mapping[str, Outcome]) -> dict[str, dict[str, Any]]:

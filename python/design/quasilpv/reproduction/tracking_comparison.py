@@ -27,10 +27,12 @@ class Sampled:
     Attributes:
         controller: its id.
         rate_hz: sample rate.
+        slew_scale: see `quasilpv.reproduction.closed_loops.ClosedLoop`.
     """
 
     controller: str
     rate_hz: float = RATE_HZ
+    slew_scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,16 @@ class Comparison:
     def run(self, label: str, observer: Observer = "whole") -> Outcome:
         """The closed loop of one controller, of those compared or beside them."""
         sampled = {**self.controllers, **self.beside}[label]
-        return outcome(ClosedLoop(self.scenario, sampled.controller, sampled.rate_hz, self.plant, observer=observer))
+        return outcome(
+            ClosedLoop(
+                self.scenario,
+                sampled.controller,
+                sampled.rate_hz,
+                self.plant,
+                observer=observer,
+                slew_scale=sampled.slew_scale,
+            )
+        )
 
     @property
     def others(self) -> tuple[str, ...]:
