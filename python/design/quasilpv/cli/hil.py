@@ -18,7 +18,7 @@ from quasilpv.cli.options import (
     require_controller,
     sensors_of,
 )
-from quasilpv.cli.pacing import Pacing, counters_of, print_latencies
+from quasilpv.cli.pacing import Pacing, print_ending, print_latencies
 from quasilpv.cli.system_hil import run_system
 from quasilpv.cli.system_options import (
     ARTIFACT_SUFFIXES,
@@ -231,11 +231,10 @@ def _print(over_lcm: HilResult, in_process: TrackResult) -> None:
     rows = [cells(in_process, "in process"), cells(over_lcm.result, f"over LCM, {over_lcm.mode}")]
     print_table(title, ("", *columns[1:]), rows)
     print_latencies(over_lcm.simulator)
-    if over_lcm.fault is not None:
-        post_mortem = over_lcm.controller["post_mortem"]
-        seq = post_mortem["seq"] if post_mortem else []
-        print(f"stopped by a fault; the last {len(seq)} samples before it are in --json, controller_report.post_mortem")
-    elif over_lcm.mode == "lockstep":
-        print(f"{over_lcm.result.run.time_s.size} samples, identical to the run in process")
-    else:
-        print(counters_of(over_lcm.simulator))
+    print_ending(
+        over_lcm.controller,
+        over_lcm.simulator,
+        mode=over_lcm.mode,
+        samples=over_lcm.result.run.time_s.size,
+        stopped=over_lcm.fault is not None,
+    )

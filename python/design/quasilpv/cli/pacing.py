@@ -56,3 +56,17 @@ def print_latencies(simulator: Mapping[str, Any]) -> None:
 def counters_of(simulator: Mapping[str, Any]) -> str:
     """What went wrong in real time, in a line."""
     return ", ".join(f"{name.replace('_', ' ')}: {simulator[name]}" for name in COUNTERS)
+
+
+def print_ending(
+    controller: Mapping[str, Any], simulator: Mapping[str, Any], *, mode: str, samples: int, stopped: bool
+) -> None:
+    """How a run over LCM ended, in a line: where a fault's last samples are, or what was identical, or counted."""
+    if stopped:
+        post_mortem = controller["post_mortem"]
+        seq = post_mortem["seq"] if post_mortem else []
+        print(f"stopped by a fault; the last {len(seq)} samples before it are in --json, controller_report.post_mortem")
+    elif mode == "lockstep":
+        print(f"{samples} samples, identical to the run in process")
+    else:
+        print(counters_of(simulator))

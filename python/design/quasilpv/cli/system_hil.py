@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quasilpv.cli.console import print_json, print_note, print_table, progress
-from quasilpv.cli.pacing import Pacing, counters_of, print_latencies
+from quasilpv.cli.pacing import Pacing, print_ending, print_latencies
 from quasilpv.cli.system_options import SystemOptions, artifact_of_system, code_of, folder_name, notes_of, rows_of
 from quasilpv.errors import FaultStop
 
@@ -68,13 +68,12 @@ def _row(over_lcm: SystemHilResult, in_process: SystemRun) -> dict[str, Any]:
 def _print(over_lcm: SystemHilResult) -> None:
     print_table(f"{over_lcm.run.artifact.name}, over LCM, {over_lcm.mode}", ("", ""), rows_of(over_lcm.run), 2)
     print_latencies(over_lcm.simulator)
-    if over_lcm.stop is not None:
-        post_mortem = over_lcm.controller["post_mortem"]
-        seq = post_mortem["seq"] if post_mortem else []
-        print(f"stopped by a fault; the last {len(seq)} samples before it are in --json, controller_report.post_mortem")
-    elif over_lcm.mode == "lockstep":
-        print(f"{len(over_lcm.run.time_s)} samples, identical to the run in process")
-    else:
-        print(counters_of(over_lcm.simulator))
+    print_ending(
+        over_lcm.controller,
+        over_lcm.simulator,
+        mode=over_lcm.mode,
+        samples=len(over_lcm.run.time_s),
+        stopped=over_lcm.stop is not None,
+    )
     for note in notes_of(over_lcm.run):
         print_note(note)
