@@ -97,6 +97,17 @@ void bind_system(py::module_& module) {
       .def_readonly("name", &SystemScenario::name)
       .def_readonly("samples", &SystemScenario::samples);
 
+  module.def(
+      "disturbance_of",
+      [](const SystemArtifact& artifact, const SystemScenario& scenario) {
+        const std::vector<double> values = disturbance_of(artifact, scenario);
+        const auto width = static_cast<py::ssize_t>(artifact.states().size() + artifact.inputs().size());
+        const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(scenario.samples), width};
+        return py::array_t<double>(shape, values.data());
+      },
+      py::arg("artifact"), py::arg("scenario"),
+      "What is added at every sample, (samples, states + inputs): to rates of states and to inputs.");
+
   module.def("simulate_system", &simulate, py::arg("artifact"), py::arg("scenario"),
              "The closed loop in lock-step: columns (samples, width), flags, and where a state left its domain. "
              "Releases the GIL.");

@@ -63,7 +63,8 @@ TEST(SystemController, keeps_the_last_input_while_a_signal_is_not_a_number) {
 
 TEST(EquationPlant, has_the_residual_the_slope_and_the_rates_of_its_equations) {
   const SystemArtifact artifact = pendulum();
-  EquationPlant plant(artifact, {});
+  const SystemDisturbance nothing;
+  EquationPlant plant(artifact, {}, nothing);
   const double input = 2.0;
   plant.set_input(&input);
   const Eigen::Vector2d y(0.3, -0.4);

@@ -23,12 +23,22 @@ from quasilpv.experiments.processes import Talk
 from quasilpv.experiments.system_hil import require_identical, run_system_over_lcm
 from quasilpv.experiments.system_run import SystemExperiment, scenario_of, simulate, simulate_scenario
 from quasilpv.scenarios import write_system_scenario
-from quasilpv.scenarios.system_schema import SystemScenario
+from quasilpv.scenarios.system_schema import (
+    ConstantDisturbance,
+    NoiseDisturbance,
+    SineDisturbance,
+    SystemScenario,
+)
 from quasilpv.telemetry.message_types import channel_type
 from quasilpv.telemetry.system_recording import COMMAND, MEASUREMENT, system_messages
 from reference.released_systems import changed, released
 from two_processes import LIMIT_S, executable
 
+PUSHED = (
+    ConstantDisturbance(signal="u", value=3.0, begin_s=0.1003, end_s=0.2),
+    SineDisturbance(signal="w", amplitude=0.2, frequency_rad_s=12.0),
+    NoiseDisturbance(signal="v", deviation=0.5),
+)
 NOISY = {"noise": {"v": 0.1, "i": 0.2}, "quantisation": {"v": 0.01}}
 
 
@@ -47,7 +57,7 @@ def artifact_path(tmp_path: Path) -> Path:
     ("name", "experiment"),
     [
         ("dc-bus", SystemExperiment({"v": 8.0}, {"P": 500.0}, delay_s=0.0002, **NOISY)),
-        ("cart-pole", SystemExperiment({"th": 0.1}, {}, 0.5, rk4_steps=4)),
+        ("cart-pole", SystemExperiment({"th": 0.1}, {}, 0.5, rk4_steps=4, disturbances=PUSHED)),
     ],
 )
 def test_in_lock_step_two_processes_give_the_samples_of_one_bit_for_bit(

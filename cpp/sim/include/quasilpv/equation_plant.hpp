@@ -7,15 +7,19 @@
 
 #include "quasilpv/implicit_system.hpp"
 #include "quasilpv/system_artifact.hpp"
+#include "quasilpv/system_disturbance.hpp"
 
 namespace quasilpv {
 
 /// F(x', x, u, p) = 0 of index one: the algebraic equations can be solved for the algebraic states. In deviations from
-/// the trim; the input is held between calls of set_input().
+/// the trim; the input is held between calls of set_input(). A disturbance w is added to inputs and to the rates of
+/// differential states: F(x' - w_x, x, u + w_u, p) = 0.
 class EquationPlant final : public ImplicitSystem {
  public:
-  /// \param artifact must outlive the plant. \param parameter deviations of all parameters, in order. INIT-ONLY.
-  EquationPlant(const SystemArtifact& artifact, const std::vector<double>& parameter);
+  /// \param artifact, disturbance must outlive the plant. \param parameter deviations of all parameters, in order.
+  /// INIT-ONLY.
+  EquationPlant(const SystemArtifact& artifact, const std::vector<double>& parameter,
+                const SystemDisturbance& disturbance);
 
   int size() const noexcept override { return states_; }
   Eigen::VectorXd differential() const override;
@@ -32,11 +36,12 @@ class EquationPlant final : public ImplicitSystem {
 
  private:
   using Signals = std::array<double, kMaxSignals + kMaxStates>;
-  Signals signals(ConstVector y, ConstVector y_dot) const noexcept;
+  Signals signals(double t, ConstVector y, ConstVector y_dot) const noexcept;
   /// dF/dx' and dF/dx, both [size x size].
   void partials(const Signals& values, Eigen::MatrixXd& by_rate, Eigen::MatrixXd& by_state) const noexcept;
 
   const SystemArtifact& artifact_;
+  const SystemDisturbance& disturbance_;
   int states_;
   int differential_;
   Signals values_{};  // inputs and parameters are in place

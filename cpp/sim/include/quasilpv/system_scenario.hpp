@@ -8,6 +8,7 @@
 
 #include "quasilpv/integrator.hpp"
 #include "quasilpv/system_artifact.hpp"
+#include "quasilpv/system_disturbance.hpp"
 
 namespace quasilpv {
 
@@ -28,6 +29,7 @@ struct SystemScenario {
   IntegratorOptions integrator = IdaOptions{};
   double delay_s = 0.0;  ///< until an input acts, at most one sample
   SystemSensorOptions sensors;
+  std::vector<DisturbanceTerm> disturbances;
 
   /// Reads a `quasilpv.system_scenario` (docs/reference/formats.md), whose values are named as the signals of
   /// `artifact`. INIT-ONLY. Throws InputError.

@@ -21,8 +21,8 @@ struct DomainExit {
   int state = 0;  ///< its index
 };
 
-/// Plant, integrator, sensors and delay of a scenario. The in-process loop and qlpv-simulator drive a system through
-/// this class only, so lock-step runs over a transport give the same samples.
+/// Plant, integrator, sensors, disturbance and delay of a scenario. The in-process loop and qlpv-simulator drive a
+/// system through this class only, so lock-step runs over a transport give the same samples.
 ///
 /// Sample k lives on [t_k, t_{k+1}], t_k = k T: `measure(k)`, then `advance(k, input_k)`. The input of the sample
 /// before acts on [t_k, t_k + delay], then input_k; before the first it is the trim. A state outside its domain at t_k
@@ -59,9 +59,12 @@ class SystemSession {
 
  private:
   void observe();
+  /// The plant under what acts from `from_s` to `to_s`, from one edge of the disturbance to the next.
+  void integrate(double from_s, double to_s);
   void set_input(const InputArray& input) noexcept;
 
   const SystemArtifact& artifact_;
+  SystemDisturbance disturbance_;
   EquationPlant plant_;
   std::unique_ptr<Integrator> integrator_;
   SystemSensorOptions sensors_;

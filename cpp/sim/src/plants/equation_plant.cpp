@@ -15,8 +15,12 @@ constexpr double kNewtonTolerance = 1e-13;  // of the step, relative to the stat
 
 }  // namespace
 
-EquationPlant::EquationPlant(const SystemArtifact& artifact, const std::vector<double>& parameter)
-    : artifact_(artifact), states_(static_cast<int>(artifact.states().size())), differential_(artifact.differential()) {
+EquationPlant::EquationPlant(const SystemArtifact& artifact, const std::vector<double>& parameter,
+                             const SystemDisturbance& disturbance)
+    : artifact_(artifact),
+      disturbance_(disturbance),
+      states_(static_cast<int>(artifact.states().size())),
+      differential_(artifact.differential()) {
   std::copy(parameter.begin(), parameter.end(), values_.begin() + states_ + static_cast<int>(artifact.inputs().size()));
 }
 
@@ -42,23 +46,27 @@ Eigen::VectorXd EquationPlant::absolute_tolerance(double tolerance) const {
   return scaled;
 }
 
-EquationPlant::Signals EquationPlant::signals(ConstVector y, ConstVector y_dot) const noexcept {
+EquationPlant::Signals EquationPlant::signals(double t, ConstVector y, ConstVector y_dot) const noexcept {
+  std::array<double, kMaxStates + kMaxInputs> added{};
+  disturbance_.add(t, added.data());
   Signals values = values_;
+  for (std::size_t k = 0; k < artifact_.inputs().size(); ++k) {
+    values[static_cast<std::size_t>(states_) + k] += added[static_cast<std::size_t>(states_) + k];
+  }
   const int rates = artifact_.signals();
   for (int k = 0; k < states_; ++k) {
     values[static_cast<std::size_t>(k)] = y[k];
-    values[static_cast<std::size_t>(rates + k)] = y_dot[k];
+    values[static_cast<std::size_t>(rates + k)] = y_dot[k] - added[static_cast<std::size_t>(k)];
   }
   return values;
 }
 
-void EquationPlant::residual(double /*t*/, ConstVector y, ConstVector y_dot, Vector residual) const noexcept {
-  artifact_.residual().evaluate({nullptr, nullptr, nullptr, signals(y, y_dot).data()}, residual.data());
+void EquationPlant::residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept {
+  artifact_.residual().evaluate({nullptr, nullptr, nullptr, signals(t, y, y_dot).data()}, residual.data());
 }
 
-void EquationPlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVector y_dot,
-                             Matrix jacobian) const noexcept {
-  const Signals values = signals(y, y_dot);
+void EquationPlant::jacobian(double t, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept {
+  const Signals values = signals(t, y, y_dot);
   std::array<double, kMaxProgramStack> row;
   for (int i = 0; i < states_; ++i) {
     artifact_.jacobian()[static_cast<std::size_t>(i)].evaluate({nullptr, nullptr, nullptr, values.data()}, row.data());
@@ -94,7 +102,7 @@ void EquationPlant::make_consistent(double t, Vector y, Vector y_dot) const {
   y_dot.setZero();
   bool solved = algebraic == 0;
   for (int step = 0; step < kNewtonSteps && !solved; ++step) {
-    const Signals values = signals(y, y_dot);
+    const Signals values = signals(t, y, y_dot);
     artifact_.residual().evaluate({nullptr, nullptr, nullptr, values.data()}, rest.data());
     partials(values, by_rate, by_state);
     const Eigen::MatrixXd slope = by_state.bottomRightCorner(algebraic, algebraic);
@@ -108,7 +116,7 @@ void EquationPlant::make_consistent(double t, Vector y, Vector y_dot) const {
   if (!solved) {
     throw PlantError("the algebraic equations have no solution near the state at t = " + std::to_string(t) + " s");
   }
-  const Signals values = signals(y, y_dot);
+  const Signals values = signals(t, y, y_dot);
   artifact_.residual().evaluate({nullptr, nullptr, nullptr, values.data()}, rest.data());
   partials(values, by_rate, by_state);
   const Eigen::MatrixXd inertia = by_rate.topLeftCorner(differential_, differential_);

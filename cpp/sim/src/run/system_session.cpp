@@ -8,9 +8,6 @@
 namespace quasilpv {
 namespace {
 
-// The shortest interval worth integrating, s.
-constexpr double kShortestInterval = 1e-9;
-
 const SystemScenario& checked(const SystemArtifact& artifact, const SystemScenario& scenario) {
   const auto require_size = [](const char* field, std::size_t got, std::size_t expected) {
     if (got != expected) {
@@ -42,7 +39,8 @@ std::vector<double> deviations(const std::vector<double>& values, const std::vec
 
 SystemSession::SystemSession(const SystemArtifact& artifact, const SystemScenario& scenario)
     : artifact_(artifact),
-      plant_(artifact, deviations(checked(artifact, scenario).parameter, artifact.parameters())),
+      disturbance_(scenario.disturbances),
+      plant_(artifact, deviations(checked(artifact, scenario).parameter, artifact.parameters()), disturbance_),
       integrator_(make_integrator(scenario.integrator, plant_, artifact.sample_period_s())),
       sensors_(scenario.sensors),
       noise_(scenario.sensors.seed),
@@ -62,6 +60,8 @@ SystemSession::SystemSession(const SystemArtifact& artifact, const SystemScenari
 }
 
 void SystemSession::observe() {
+  disturbance_.draw();
+  disturbance_.begin(time_s());
   plant_.make_consistent(time_s(), y_, slope_);
   for (std::size_t i = 0; i < truth_.size(); ++i) {
     const SystemSignal& state = artifact_.states()[i];
@@ -96,14 +96,19 @@ void SystemSession::advance(const InputArray& input, double delay_s) {
     set_input(input);  // the last sample: nobody looks at where it leads
     return;
   }
-  if (jump_s > from_s) {
-    integrator_->advance(from_s, jump_s, y_);
-  }
+  integrate(from_s, jump_s);
   set_input(input);
-  if (to_s - jump_s > kShortestInterval) {
-    integrator_->advance(jump_s, to_s, y_);
-  }
+  integrate(jump_s, to_s);
   observe();
+}
+
+void SystemSession::integrate(double from_s, double to_s) {
+  while (to_s - from_s > kShortestInterval) {
+    const double edge_s = disturbance_.next_edge(from_s, to_s);
+    disturbance_.begin(from_s);
+    integrator_->advance(from_s, edge_s, y_);
+    from_s = edge_s;
+  }
 }
 
 }  // namespace quasilpv

@@ -58,4 +58,18 @@ SystemRun simulate_system(const SystemArtifact& artifact, const SystemScenario& 
   return run;
 }
 
+std::vector<double> disturbance_of(const SystemArtifact& artifact, const SystemScenario& scenario) {
+  const std::size_t width = artifact.states().size() + artifact.inputs().size();
+  const std::size_t samples = static_cast<std::size_t>(scenario.samples);
+  SystemDisturbance disturbance(scenario.disturbances);
+  std::vector<double> values(samples * width, 0.0);
+  for (std::size_t k = 0; k < samples; ++k) {
+    const double time_s = static_cast<double>(k) * artifact.sample_period_s();
+    disturbance.draw();
+    disturbance.begin(time_s);
+    disturbance.add(time_s, values.data() + k * width);
+  }
+  return values;
+}
+
 }  // namespace quasilpv

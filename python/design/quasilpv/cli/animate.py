@@ -12,6 +12,7 @@ from quasilpv.cli.options import EncoderOption, FormatOption, LogOption, RateOpt
 from quasilpv.cli.system_options import (
     ARTIFACT_SUFFIXES,
     DelayOption,
+    DisturbanceOption,
     DurationOption,
     NoiseOption,
     ParameterOption,
@@ -60,6 +61,7 @@ def animate_command(
     noise: NoiseOption = None,
     quantisation: QuantisationOption = None,
     seed: SeedOption = None,
+    disturbance: DisturbanceOption = None,
     out: Annotated[
         Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for animations, run files and figures.")
     ] = Path("out/animate"),
@@ -84,7 +86,7 @@ def animate_command(
     from quasilpv.scenarios import tracking_experiment
 
     formats = formats_of(figure_formats)
-    own = SystemOptions(start, parameter, duration_s, delay_s, rk4_steps, noise, quantisation, seed)
+    own = SystemOptions(start, parameter, duration_s, delay_s, rk4_steps, noise, quantisation, seed, disturbance)
     artifacts = [name for name in scenarios or () if name.endswith(ARTIFACT_SUFFIXES)]
     if artifacts:
         robots = {"--rate-hz": rate_hz, "--encoder-bits": encoder_bits, "--plant": plant}

@@ -23,6 +23,7 @@ from quasilpv.cli.system_hil import run_system
 from quasilpv.cli.system_options import (
     ARTIFACT_SUFFIXES,
     DelayOption,
+    DisturbanceOption,
     DurationOption,
     NoiseOption,
     ParameterOption,
@@ -87,6 +88,7 @@ def hil_command(
     noise: NoiseOption = None,
     quantisation: QuantisationOption = None,
     seed: SeedOption = None,
+    disturbance: DisturbanceOption = None,
     url: Annotated[
         str | None,
         typer.Option("--url", help="LCM URL of both, so that others can listen.  [default: a port of its own]"),
@@ -114,7 +116,7 @@ def hil_command(
     """
     if priority is not None and not real_time:
         raise InputError("command line", "--priority", priority, "nothing without --real-time: lock-step has no clock")
-    own = SystemOptions(start, parameter, duration_s, delay_s, rk4_steps, noise, quantisation, seed)
+    own = SystemOptions(start, parameter, duration_s, delay_s, rk4_steps, noise, quantisation, seed, disturbance)
     pace = Pacing(real_time, silence_s, hold_s, priority, url, key)
     if scenario.endswith(ARTIFACT_SUFFIXES):
         robots = {

@@ -11,6 +11,7 @@ from quasilpv.cli.console import JsonOption, print_json, print_note, print_table
 from quasilpv.cli.options import FormatOption, formats_of
 from quasilpv.cli.system_options import (
     DelayOption,
+    DisturbanceOption,
     DurationOption,
     NoiseOption,
     ParameterOption,
@@ -38,6 +39,7 @@ def simulate_command(
     noise: NoiseOption = None,
     quantisation: QuantisationOption = None,
     seed: SeedOption = None,
+    disturbance: DisturbanceOption = None,
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", metavar="DIR", help="Write figures and the log of the run into this folder."),
@@ -47,8 +49,8 @@ def simulate_command(
 ) -> int:
     """Run a controller of a system against its nonlinear equations, sampled and held as on a real plant.
 
-    Exit code 1 if the run began inside the region and V rose above its start (with --noise or --quantisation: above 1),
-    or a state left its domain.
+    Exit code 1 if the run began inside the region and V rose above its start (with --noise, --quantisation or
+    --disturbance: above 1), or a state left its domain.
 
     \b
     Example:
@@ -60,7 +62,7 @@ def simulate_command(
     if out is not None:
         claim_folder(out)
     read = artifact_of_system(artifact, "design track")
-    options = SystemOptions(start, parameter, duration_s, delay_s, rk4_steps, noise, quantisation, seed)
+    options = SystemOptions(start, parameter, duration_s, delay_s, rk4_steps, noise, quantisation, seed, disturbance)
     run = simulate(read, options.experiment(), str(artifact))
     if json:
         print_json(run.to_document())

@@ -55,6 +55,15 @@ SeedOption: TypeAlias = Annotated[
     int | None, typer.Option("--seed", min=0, help="Of the noise; equal seeds give equal runs.")
 ]
 
+DisturbanceOption: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--disturbance",
+        metavar="NAME=FORM",
+        help="Added to an input, or to the rate of a state: 0.5, step:0.5,FROM[,TO], sine:0.5,RAD/S[,RAD], noise:0.5.",
+    ),
+]
+
 
 @dataclass(frozen=True)
 class SystemOptions:
@@ -68,6 +77,7 @@ class SystemOptions:
     noise: Sequence[str] | None
     quantisation: Sequence[str] | None
     seed: int | None
+    disturbance: Sequence[str] | None
 
     def given(self) -> list[str]:
         """The names of the options that were given."""
@@ -80,6 +90,7 @@ class SystemOptions:
             "--noise": self.noise,
             "--quantisation": self.quantisation,
             "--seed": self.seed,
+            "--disturbance": self.disturbance,
         }
         return [name for name, value in named.items() if value is not None and value != []]
 
@@ -89,6 +100,7 @@ class SystemOptions:
         Raises:
             InputError: not of the form NAME=VALUE, a name twice, or a seed that cannot be kept.
         """
+        from quasilpv.cli.disturbances import disturbances_of
         from quasilpv.experiments.system_run import SystemExperiment
 
         seed = {} if self.seed is None else {"seed": self.seed}
@@ -100,6 +112,7 @@ class SystemOptions:
             self.rk4_steps or 0,
             noise=numbers_by_name("--noise", self.noise),
             quantisation=numbers_by_name("--quantisation", self.quantisation),
+            disturbances=disturbances_of(self.disturbance, self.seed),
             **seed,
         )
 
@@ -130,6 +143,8 @@ def artifact_of_system(path: Path, robots: str) -> SystemArtifactDocument:
 
 def rows_of(run: SystemRun) -> list[tuple[str, str]]:
     """A run for people, as the rows of a table."""
+    from quasilpv.experiments.system_run import gain_of
+
     answer: dict[str, Any] = run.to_document()
     states = ", ".join(f"{name} {value:.4g}" for name, value in answer["final_state"].items())
     inputs = ", ".join(f"{name} {value:.4g}" for name, value in answer["largest_input"].items())
@@ -141,6 +156,12 @@ def rows_of(run: SystemRun) -> list[tuple[str, str]]:
         ("largest input", inputs),
         ("flags", ", ".join(answer["flags"]) or "none"),
     ]
+    gain = gain_of(run)
+    if gain is not None and run.artifact.l2_gain is not None:
+        certified, energy = run.artifact.l2_gain
+        rows.append(
+            ("gain", f"{gain[0]:.4g} with energy {gain[1]:.4g} s; at most {certified:.4g} up to {energy:.4g} s")
+        )
     if run.exit is not None:
         rows.append(("left its domain", f"{run.exit[1]} at {run.exit[0]:.6g} s"))
     return rows
@@ -151,6 +172,8 @@ def notes_of(run: SystemRun) -> list[str]:
     notes = []
     if run.level[0] > 1.0:
         notes.append("the start is outside the region: nothing is proved of this run")
+    if run.scenario.disturbances:
+        notes.append("the region is proved without disturbance: this run with one is beside it")
     if not run.scenario.has_exact_sensors:
         notes.append("the proof assumes exact measurements: this run with noise or quantisation is beside it")
     return notes

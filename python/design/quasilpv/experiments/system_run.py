@@ -12,10 +12,10 @@ import numpy.typing as npt
 from quasilpv import _runtime
 from quasilpv.arrays import FloatArray
 from quasilpv.documents.canonical import MAX_SAFE_INTEGER, canonical_json
-from quasilpv.documents.system_artifact import SystemArtifactDocument
+from quasilpv.documents.system_artifact import DISTURBANCE, PERFORMANCE, SystemArtifactDocument
 from quasilpv.errors import InputError
 from quasilpv.scenarios import NOISE_SEED, IdaIntegrator, Rk4Integrator, SystemScenario
-from quasilpv.scenarios.system_schema import MOST_SAMPLES, SystemSensors, values_by_name
+from quasilpv.scenarios.system_schema import MOST_SAMPLES, SystemDisturbance, SystemSensors, values_by_name
 from quasilpv.telemetry.codes import SYSTEM_FLAGS
 
 SETTLING_TIMES = 6.0
@@ -36,6 +36,7 @@ class SystemExperiment:
         noise: standard deviations of white noise on what is measured of states, by name.
         quantisation: steps to which what is measured of states is rounded, by name.
         seed: of the noise.
+        disturbances: what acts on inputs and on rates of states.
     """
 
     start: Mapping[str, float]
@@ -47,6 +48,7 @@ class SystemExperiment:
     noise: Mapping[str, float] = field(default_factory=dict)
     quantisation: Mapping[str, float] = field(default_factory=dict)
     seed: int = NOISE_SEED
+    disturbances: tuple[SystemDisturbance, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +89,8 @@ class SystemRun:
 
     @property
     def stayed(self) -> bool:
-        """Whether no state left its domain, and V never exceeded its start or, with sensors that are not exact, 1."""
-        bound = self.level[0] if self.scenario.has_exact_sensors else max(self.level[0], 1.0)
+        """Whether no state left its domain, and V never exceeded its start or, in what no proof is of, 1."""
+        bound = self.level[0] if self.scenario.is_nominal else max(self.level[0], 1.0)
         return self.exit is None and bool(self.level.max() <= max(bound, 1e-300) * (1.0 + 1e-9))
 
     def first_difference(self, other: SystemRun) -> str | None:
@@ -122,6 +124,7 @@ class SystemRun:
                 for k, signal in enumerate(self.artifact.inputs)
             },
             "exact_sensors": self.scenario.has_exact_sensors,
+            "disturbed": sorted({term.signal for term in self.scenario.disturbances}),
             "flags": list(self.flags),
             "left_domain": None if self.exit is None else {"time_s": self.exit[0], "signal": self.exit[1]},
         }
@@ -161,7 +164,8 @@ def scenario_of(artifact: SystemArtifactDocument, experiment: SystemExperiment, 
         else IdaIntegrator(relative_tolerance=tolerance, absolute_tolerance=0.01 * tolerance),
         delay_s=experiment.delay_s,
         sensors=SystemSensors(noise=noise, quantum=quantum, seed=experiment.seed),
-    )
+        disturbances=experiment.disturbances,
+    ).require_names_of(artifact, source)
 
 
 def _samples(artifact: SystemArtifactDocument, experiment: SystemExperiment, source: str) -> int:
@@ -211,6 +215,39 @@ def simulate_scenario(artifact: SystemArtifactDocument, scenario: SystemScenario
         sample_flags=columns["flags"][:, 0].astype(np.int64),
         exit=found["exit"],
     )
+
+
+def disturbance_of(run: SystemRun) -> FloatArray:
+    """What was added at the samples of a run, (N, n + m): to rates of states, and to inputs."""
+    runtime = _runtime.SystemArtifact.parse(canonical_json(run.artifact.to_document()))
+    scenario = _runtime.SystemScenario.parse(canonical_json(run.scenario.to_document()), run.scenario.name, runtime)
+    added = _runtime.disturbance_of(runtime, scenario)
+    return np.asarray(added[np.rint(run.time_s / run.artifact.sample_period_s).astype(np.int64)])
+
+
+def gain_of(run: SystemRun) -> tuple[float, float] | None:
+    """``(int z'z dt / int w'w dt)^(1/2)`` of a run and its ``int w'w dt`` (s), by sums over its samples.
+
+    In the sizes of the design, with the performance z and the disturbance w that the design for an L2 gain names; None
+    if it is of another objective, or if nothing disturbs.
+    """
+    artifact, witness = run.artifact, run.artifact.witness
+    if artifact.l2_gain is None or not run.scenario.disturbances:
+        return None
+    trim = np.array([signal.trim for signal in (*artifact.states, *artifact.inputs)])
+    signals = np.hstack([run.state, run.input]) - trim
+    period = artifact.sample_period_s
+    added, seen = (
+        period * _energy(values, np.array(witness[name][0]))
+        for name, values in ((DISTURBANCE, disturbance_of(run)), (PERFORMANCE, signals))
+    )
+    return (float(np.sqrt(seen / added)), added) if added > 0.0 else None
+
+
+def _energy(values: FloatArray, sizes: FloatArray) -> float:
+    """Sum of squares of the signals that have a size, in it."""
+    own = sizes > 0.0
+    return float(((values[:, own] / sizes[own]) ** 2).sum())
 
 
 def level_of(artifact: SystemArtifactDocument, state: FloatArray) -> FloatArray:
