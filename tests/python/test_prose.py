@@ -6,8 +6,8 @@ import prose
 import pytest
 from markdown_it import MarkdownIt
 
+from pages import PAGES, ROOT
 from quasilpv.conditions.reliance import Reliance
-from test_documentation import PAGES, ROOT
 
 WRITTEN = [page for page in PAGES if page.name != "benchmark-results.md"]  # that one is generated
 
