@@ -1,10 +1,10 @@
-"""``design robust`` for general systems: the grid check of `quasilpv.experiments.system_grid`."""
+"""``design robust`` for general systems: a grid check, and how far intervals of parameters can grow, proved."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from quasilpv.cli.console import print_json, print_note, print_table, progress
 from quasilpv.files import claim_folder
@@ -32,16 +32,26 @@ def check_system(
         PlantError: the equations could not be integrated.
     """
     from quasilpv.experiments.system_grid import grid_check
+    from quasilpv.system_release.parameter_margin import margin_document, parameter_margins
 
     if out is not None:
         claim_folder(out)
-    with progress(1) as steps:
+    with progress(2 if artifact.parameters else 1) as steps:
         steps.begin(f"points of the region of {artifact.name}")
         found = grid_check(artifact, delay_s, source=source, progress=steps.parts)
         steps.end()
+        margins = []
+        if artifact.parameters:
+            steps.begin("intervals of its parameters")
+            margins = [margin_document(artifact, each) for each in parameter_margins(artifact, steps.parts)]
+            steps.end()
     if json:
-        print_json(found.to_document())
+        print_json({**found.to_document(), "parameter_margins": margins})
     else:
+        if margins:
+            columns = ("parameter", "claim", "proved in", "refuted in", "")
+            title = f"{source}: how far intervals of parameters can grow, before sampling"
+            print_table(title, columns, _margin_rows(margins), left_columns=5)
         print_table(source, ("", ""), rows_of(found), left_columns=2)
         verdict = "V falls from every point" if found.passed else "NOT passed: V does not fall from every point"
         print(f"{verdict}; sampled, not a proof")
@@ -52,6 +62,22 @@ def check_system(
         for path in save(grid_figure(found), out / FIGURE, formats):
             print_note(f"wrote {path}")
     return 0 if found.passed else 1
+
+
+def _margin_rows(margins: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
+    """One per parameter and claim; between both intervals it is unknown."""
+    rows: list[tuple[str, ...]] = []
+    for margin in margins:
+        together = "" if len(margin["parameters"]) == 1 else ", all together"
+        for name in margin["parameters"]:
+            proved, refuted = (
+                "none found"
+                if margin[word] is None
+                else f"{margin[word][name][0]:.6g} to {margin[word][name][1]:.6g}, {margin[f'{word}_factor']:.4g} times"
+                for word in ("proved", "refuted")
+            )
+            rows.append((f"{name}{together}", margin["claim"], proved, refuted, margin["reason"]))
+    return rows
 
 
 def rows_of(found: SystemGrid) -> list[tuple[str, str]]:

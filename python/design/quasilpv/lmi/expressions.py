@@ -358,6 +358,16 @@ class Expression:
             term.map_constants(to_rational).add_to(total, exact[term.variable])
         return total
 
+    def given(self, values: Mapping[Variable, Matrix]) -> Expression:
+        """The same expression with these values of some variables, which it then no longer has; exact if they are."""
+        total, rest = self.constant, []
+        for term in self.terms:
+            if term.variable in values:
+                total = total + term.at(values[term.variable])
+            else:
+                rest.append(term)
+        return Expression(total, tuple(rest))
+
     def map_constants(self, function: Callable[[Matrix], Matrix]) -> Expression:
         """The same expression with ``function`` applied to every constant array (a change of scalar)."""
         return Expression(function(self.constant), tuple(term.map_constants(function) for term in self.terms))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf, isfinite, nextafter
 
 from flint import arb
 
@@ -10,6 +11,9 @@ from quasilpv.certificate.exact.claims import Claim
 from quasilpv.certificate.exact.program_values import Code, program_values
 
 LARGEST_SUBDIVISION = 200_000
+
+PIECES = 256
+"""Into which a domain is divided where a range is looked for."""
 
 Domain = Mapping[str, Sequence[Sequence[float]]]
 """Intervals of what a program reads: of ``angle`` and ``speed`` by joint, or of ``signal`` by number."""
@@ -61,9 +65,38 @@ def range_claim(title: str, code: Code, domain: Domain, box: tuple[float, float]
         if not wide or middle.upper() < box[0] or middle.lower() > box[1]:
             break
         widest = max(wide, key=lambda key: (piece[key][1] - piece[key][0]) / (whole[key][1] - whole[key][0]))
-        low, high = piece[widest]
-        pending += [{**piece, widest: half} for half in ((low, (low + high) / 2.0), ((low + high) / 2.0, high))]
+        pending += [{**piece, widest: half} for half in _halves(piece[widest])]
     return Claim.enclosed(title, holds=False, margin=-1.0)
+
+
+def range_of(code: Code, domain: Domain, box: tuple[float, float]) -> tuple[float, float] | None:
+    """An interval that holds a box and the values of a program over a domain: the box if that is seen to do.
+
+    Args:
+        code: leaves one value.
+        domain: intervals of all inputs.
+        box: lower and upper bound.
+
+    Returns:
+        None if a value could not be enclosed.
+    """
+    if range_claim("", code, domain, box).holds:
+        return box
+    used = sorted({(op[0], int(op[1])) for op in code if op[0] in domain})
+    pieces = [{key: (float(domain[key[0]][key[1]][0]), float(domain[key[0]][key[1]][1])) for key in used}]
+    while len(pieces) < PIECES:
+        key = used[len(pieces).bit_length() % len(used)]
+        pieces = [{**piece, key: half} for piece in pieces for half in _halves(piece[key])]
+    balls = [_enclosure(code, domain, piece) for piece in pieces]
+    ends = min(box[0], *(float(ball.lower()) for ball in balls)), max(box[1], *(float(ball.upper()) for ball in balls))
+    if not (isfinite(ends[0]) and isfinite(ends[1])):
+        return None
+    return float(nextafter(ends[0], -inf)), float(nextafter(ends[1], inf))
+
+
+def _halves(interval: tuple[float, float]) -> tuple[tuple[float, float], tuple[float, float]]:
+    low, high = interval
+    return (low, (low + high) / 2.0), ((low + high) / 2.0, high)
 
 
 def _enclosure(code: Code, domain: Domain, piece: Mapping[tuple[str, int], tuple[float, float]]) -> arb:

@@ -341,8 +341,7 @@ class _Claims:
     def premises(self) -> Iterator[Claim]:
         """The premise box, and that the law is scheduled on the same premises as the model."""
         model, law = self.artifact.model, self.artifact.law
-        signals = zip(self.artifact.signals, self._extents(), strict=True)
-        domain = {"signal": [_interval(signal, extent) for signal, extent in signals]}
+        domain = domain_of(self.artifact)
         pieces = outputs_of(model.premises.code)
         schedule = outputs_of(law.schedule.code)
         for p, (code, used) in enumerate(zip(pieces, schedule, strict=True)):
@@ -363,11 +362,13 @@ class _Claims:
         spread = fmpq(0) if same else fmpq(2)
         return Claim.at_most(f"gain independent of {self.artifact.model.names[p]}", spread, fmpq(1))
 
-    def _extents(self) -> list[float]:
-        """Of every signal, the largest magnitude the region allows, rounded up; infinite where it says nothing."""
-        P = self.artifact.region.lyapunov
-        reach = [float(np.nextafter(np.sqrt(P[k][k]) * (1 + 1e-12), inf)) for k in range(self.q)]
-        return reach + [inf] * (len(self.artifact.signals) - self.q)
+
+def domain_of(artifact: SystemArtifactDocument) -> dict[str, list[tuple[float, float]]]:
+    """Of every signal the interval in which it is while the region is not left."""
+    P, q = artifact.region.lyapunov, artifact.model.differential
+    reach = [float(np.nextafter(np.sqrt(P[k][k]) * (1 + 1e-12), inf)) for k in range(q)]
+    extents = reach + [inf] * (len(artifact.signals) - q)
+    return {"signal": [_interval(signal, extent) for signal, extent in zip(artifact.signals, extents, strict=True)]}
 
 
 def plant_claim(artifact: SystemArtifactDocument) -> Claim:
