@@ -23,17 +23,17 @@ from quasilpv.telemetry.codes import AT_LIMIT
 from quasilpv.view.page import Page
 from quasilpv.view.playback import Motion, Playback
 from quasilpv.view.robot_scene import in_space, turned_from_x
-from reference.readable import assert_readable
+from reference.readable import assert_readable, texts_with_boxes
 from reference.runs import result_of_motion, synthetic_run
 
 UR5 = any_robot("ur5").model
 POSTURE = np.array([0.2, -1.7, 2.0, -1.87, -1.57, 0.3])
 
 
-def result_in_space(error_rad: float = 1e-4) -> TrackResult:
+def result_in_space(error_rad: float = 1e-4, posture: np.ndarray = POSTURE) -> TrackResult:
     """A UR5 about a regular posture."""
     run = synthetic_run(1000, 6)
-    reference = POSTURE + 0.15 * run.reference_angle_rad
+    reference = posture + 0.15 * run.reference_angle_rad
     true = reference + error_rad * np.sin(30.0 * reference)
     run = replace(run, reference_angle_rad=reference, true_angle_rad=true)
     return result_of_motion(UR5, run, Variant("dob-acceleration"))
@@ -44,6 +44,12 @@ def test_when_a_figure_in_space_is_drawn_expect_no_text_cut_or_over_another(
     draw: Callable[[TrackResult], Figure],
 ) -> None:
     assert_readable(draw(result_in_space()))
+
+
+def test_when_a_tall_arm_is_drawn_expect_the_labels_of_its_axes_above_the_error() -> None:
+    boxes = texts_with_boxes(robot_figure(result_in_space(posture=np.array([0.0, -1.7, 0.3, -0.4, -1.57, 0.3]))))
+    [title] = [box for text, box in boxes if text.startswith("error of the tool")]
+    assert all(box[1] > title[3] for text, box in boxes if text in {"X (m)", "Y (m)"})
 
 
 def test_when_runs_in_space_are_compared_expect_no_text_cut_or_over_another() -> None:

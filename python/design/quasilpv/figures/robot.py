@@ -28,8 +28,8 @@ def robot_figure(result: TrackResult) -> Figure:
     way, marks = way_of(result)
     postures = [result.robot.skeleton(result.run.true_angle_rad[sample]) for sample in marks]
     with style():
-        figure = new_figure(6.8, f"{result.title}: the robot, and its tool along the path")
-        grid = figure.add_gridspec(2, 1, height_ratios=(2.7, 1.0))
+        figure = new_figure(7.0, f"{result.title}: the robot, and its tool along the path")
+        grid = figure.add_gridspec(2, 1, height_ratios=(2.7, 1.0), hspace=0.2)  # axes in space have labels below them
         points = np.concatenate([*postures, result.reference_position_m])
         axes = space_axes(figure, grid[0], points, Viewpoint.of_path(result.reference_position_m), zoom=0.9)
         for posture in reversed(postures[1:]):
