@@ -243,6 +243,35 @@ TEST(SystemLoop, when_premises_stay_outside_their_box_expect_degraded_then_a_fau
   EXPECT_EQ(loop.cause(), FaultCause::kPremiseOutsideBox);
 }
 
+TEST(SystemLoop, when_the_artifact_states_a_policy_for_premises_outside_expect_the_loop_to_keep_it) {
+  const auto loop_with = [](const Json& policy) {
+    Json table = system_table();
+    table["schema_version"] = 2;
+    table["law"]["premise_fault_s"] = policy;
+    return SystemLoop(SystemArtifact::parse(json_twin(table), "test"), {});
+  };
+  SystemLoop at_once = loop_with(0);
+  at_once.handle(reading(0, 1.1), at(0));
+  EXPECT_EQ(at_once.state(), ControllerState::kRunning);
+  at_once.handle(reading(1, 4.0), at(1));
+  EXPECT_EQ(at_once.cause(), FaultCause::kPremiseOutsideBox);
+  EXPECT_FALSE(at_once.reset_fault());  // it is still outside
+  at_once.handle(reading(2, 1.1), at(2));
+  EXPECT_TRUE(at_once.reset_fault());
+  SystemLoop after = loop_with(0.1);
+  SystemLoop never = loop_with(nullptr);
+  for (std::int64_t k = 0; k <= 10; ++k) {
+    after.handle(reading(k, 4.0), at(k));
+    ASSERT_EQ(after.state(), ControllerState::kDegraded);
+  }
+  after.handle(reading(11, 4.0), at(11));
+  EXPECT_EQ(after.cause(), FaultCause::kPremiseOutsideBox);
+  for (std::int64_t k = 0; k <= 1000; ++k) {
+    never.handle(reading(k, 4.0), at(k));
+    ASSERT_EQ(never.state(), ControllerState::kDegraded);
+  }
+}
+
 TEST(SystemLoop, when_the_plant_falls_silent_or_somebody_asks_expect_the_fault_of_that_cause) {
   SystemLoop silent(pendulum(), {});
   silent.handle(reading(0), at(0));

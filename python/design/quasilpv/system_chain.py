@@ -52,6 +52,7 @@ class StabiliseOptions(TypedDict, total=False):
     share: float
     disturbance: Mapping[str, float]
     performance: Mapping[str, float]
+    premise_fault_s: float | None
     parameters: Mapping[str, float]
     allow_unproved_rate: bool
 
@@ -204,7 +205,7 @@ def stabilise(system: SystemLike, **options: Unpack[StabiliseOptions]) -> System
         system: a `DescriptorSystem`, a function of parameters that makes one, or a reference as on the command line.
         **options: ``objective`` (``largest-region``, ``fastest``, ``least-gain``, ``least-l2-gain``),
             ``decay_rate`` (1/s), ``input_limits`` by name, ``rate_hz``, ``speed`` (1/s), ``share``, ``disturbance`` and
-            ``performance`` by name; ``parameters`` of the function; ``allow_unproved_rate``.
+            ``performance`` by name; ``premise_fault_s``; ``parameters`` of the function; ``allow_unproved_rate``.
 
     Raises:
         InputError: something does not exist or does not fit.

@@ -42,7 +42,7 @@ SystemArtifact SystemArtifact::parse(std::string_view bytes, const std::string& 
   const Json document = parse_document(bytes, source);
   const Field root(document, source, "");
   root["schema"].expect_text(kSchema);
-  root["schema_version"].integer(1, 1);
+  const bool has_policy = root["schema_version"].integer(1, 2) > 1;
   root.only({"schema", "schema_version", "hash", "name", "creator", "design_hash", "sample_period_s", "signals",
              "model", "law", "region", "plant", "witness", "sampling", "verification"});
   SystemArtifact artifact;
@@ -54,7 +54,12 @@ SystemArtifact SystemArtifact::parse(std::string_view bytes, const std::string& 
   const int states = static_cast<int>(artifact.states_.size());
   artifact.differential_ = static_cast<int>(root["model"]["differential"].integer(1, states));
   const Field law = root["law"];
-  law.only({"kind", "gain", "schedule"});
+  law.only(has_policy ? std::vector<std::string>{"kind", "gain", "schedule", "premise_fault_s"}
+                      : std::vector<std::string>{"kind", "gain", "schedule"});
+  if (has_policy) {
+    const Field policy = law["premise_fault_s"];
+    artifact.premise_fault_s_ = policy.is_null() ? kInfinity : policy.non_negative();
+  }
   law["kind"].expect_text("regional-feedback");
   artifact.gain_ = BlockPolytope::parse(law["gain"], static_cast<int>(artifact.inputs_.size()), artifact.differential_);
   ProgramScope scope;

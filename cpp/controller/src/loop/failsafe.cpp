@@ -33,7 +33,7 @@ FaultCause fault_cause(const FailsafeSettings& settings, const FailsafeFlags& fl
   if (flags.consecutive_foreign >= settings.foreign_limit) {
     return FaultCause::kForeignMessages;
   }
-  if (settings.premise_fault_ns > 0 && outside_ns > settings.premise_fault_ns) {
+  if (settings.premise_fault_ns != 0 && flags.premise_outside_box && outside_ns > settings.premise_fault_ns) {
     return FaultCause::kPremiseOutsideBox;
   }
   return FaultCause::kNone;

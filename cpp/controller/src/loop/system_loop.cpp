@@ -14,6 +14,15 @@ SignalArray unknown() noexcept {
   return value;
 }
 
+/// As FailsafeSettings has it.
+std::int64_t premise_fault_ns(double premise_fault_s) noexcept {
+  constexpr double kLongest = 9e9;  // in nanoseconds a 64-bit integer
+  if (premise_fault_s > kLongest) {
+    return 0;
+  }
+  return premise_fault_s > 0.0 ? static_cast<std::int64_t>(premise_fault_s * 1e9) : -1;
+}
+
 }  // namespace
 
 SystemLoop::SystemLoop(const SystemArtifact& artifact, const SystemLoopSettings& settings)
@@ -23,6 +32,7 @@ SystemLoop::SystemLoop(const SystemArtifact& artifact, const SystemLoopSettings&
     safe_input_[k] = input.trim + std::clamp(0.0, input.low, input.high);
   }
   last_input_ = safe_input_;
+  settings_.failsafe.premise_fault_ns = premise_fault_ns(artifact.premise_fault_s());
   telemetry_.realtime = settings.realtime;
 }
 

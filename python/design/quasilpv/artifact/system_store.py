@@ -68,6 +68,7 @@ def system_summary(artifact: SystemArtifactDocument) -> dict[str, Any]:
                 strict=True,
             )
         ),
+        "premise_outside": _outside(artifact.law.premise_fault_s),
         "vertices": gain.vertex_count,
         "instructions": {
             "schedule": len(artifact.law.schedule.code),
@@ -78,6 +79,13 @@ def system_summary(artifact: SystemArtifactDocument) -> dict[str, Any]:
         "sampling": "not proved" if artifact.sampling is None else artifact.sampling.model_dump(mode="json"),
         "verification": artifact.verification,
     }
+
+
+def _outside(fault_s: float | None) -> str:
+    """The policy where a premise is outside its box, in words."""
+    if fault_s is None:
+        return "clamped, no fault"
+    return "a fault at once" if fault_s == 0.0 else f"clamped, a fault after {fault_s:g} s"
 
 
 def _interval(low: float | None, high: float | None, trim: float) -> str:

@@ -21,7 +21,7 @@ from quasilpv.cli.options import (
     robot_named,
 )
 from quasilpv.cli.parameters import SetOption
-from quasilpv.cli.systems import names_a_system, numbers_by_name, print_system, write_system
+from quasilpv.cli.systems import names_a_system, numbers_by_name, premise_fault_of, print_system, write_system
 from quasilpv.errors import ClaimError, InfeasibleError, InputError
 from quasilpv.files import claim_folder
 from quasilpv.synthesis import CONTROLLERS, DEFAULT_CONTROLLER, DesignRequest, default_controller
@@ -102,6 +102,15 @@ def synth_command(
             help="For least-l2-gain: a state or an input, and which deviation of it counts as 1.",
         ),
     ] = None,
+    premise_policy: Annotated[
+        str | None,
+        typer.Option(
+            "--premise-policy",
+            metavar="clamp|fault|S",
+            help="Of a system, where a premise leaves its box: clamp it, a fault, or a fault after so many seconds."
+            "  [default: 1]",
+        ),
+    ] = None,
     set_: SetOption = None,
     allow_unproved_rate: Annotated[
         bool,
@@ -133,6 +142,7 @@ def synth_command(
         "--share": share,
         "--disturbance": disturbance,
         "--performance": performance,
+        "--premise-policy": premise_policy,
         "--set": set_,
         "--allow-unproved-rate": allow_unproved_rate or None,
     }
@@ -161,6 +171,7 @@ def synth_command(
             parameters=numbers_by_name("--set", set_),
             allow_unproved_rate=allow_unproved_rate,
             **{name: value for name, value in wanted.items() if value is not None},
+            **premise_fault_of(premise_policy),
         )
         if json:
             print_json(made)

@@ -39,6 +39,21 @@ def numbers_by_name(option: str, texts: Sequence[str] | None) -> dict[str, float
     return found
 
 
+def premise_fault_of(policy: str | None) -> dict[str, float | None]:
+    """``--premise-policy`` as what a request says of it; nothing of nothing.
+
+    Raises:
+        InputError: it is none.
+    """
+    named = {"clamp": None, "fault": 0.0}
+    if policy is None:
+        return {}
+    value = named[policy] if policy in named else number(policy)
+    if policy not in named and (value is None or value < 0.0):
+        raise InputError("command line", "--premise-policy", policy, "clamp, fault, or a time >= 0, s")
+    return {"premise_fault_s": value}
+
+
 def write_system(
     reference: str, out: Path | None, *, parameters: Mapping[str, float], allow_unproved_rate: bool, **wanted: Any
 ) -> dict[str, Any]:

@@ -19,6 +19,12 @@ from quasilpv.documents.strict_model import FieldError, NonNegative, Number, Pos
 from quasilpv.documents.tables import Matrix, PolytopeTable, Vector, require_lyapunov, require_shape, require_size
 
 SCHEMA = "quasilpv.system_artifact"
+SCHEMA_VERSION = 2
+"""Of what is written; version 1 is read, too."""
+
+PREMISE_FAULT_S = 1.0
+"""For so long a premise may be outside its box where nothing else is said, as in version 1."""
+
 MAX_STATES = 32
 MAX_INPUTS = 7
 
@@ -97,6 +103,8 @@ class RegionalFeedback(StrictModel):
     gain: PolytopeTable
     schedule: Program
     """As ``premises`` of the model, the centre of the box for what the law is not told."""
+    premise_fault_s: NonNegative | None = PREMISE_FAULT_S
+    """Policy where a premise is outside its box: clamped, and after so long a fault; 0: at once, None: never."""
 
 
 class RegionDocument(StrictModel):
@@ -141,7 +149,7 @@ class SystemArtifactDocument(StrictModel):
     """One controller of a general system, immutable. The hash is not stored; it is computed from the content."""
 
     schema_: Literal["quasilpv.system_artifact"] = Field(alias="schema")
-    schema_version: Literal[1]
+    schema_version: Literal[1, 2]
     name: Name
     creator: Creator
     design_hash: Sha256
@@ -188,8 +196,11 @@ class SystemArtifactDocument(StrictModel):
         return document_hash(self.content())
 
     def content(self) -> Document:
-        """Return the artifact as a JSON tree without its hash."""
-        return self.model_dump(mode="json", by_alias=True)
+        """Return the artifact as a JSON tree without its hash, in the version it was written in."""
+        content: Document = self.model_dump(mode="json", by_alias=True)
+        if self.schema_version == 1:
+            del content["law"]["premise_fault_s"]
+        return content
 
     def to_document(self) -> Document:
         """Return the artifact as a normalised JSON tree, hash included."""
@@ -207,6 +218,10 @@ class SystemArtifactDocument(StrictModel):
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Self:
+        said = "premise_fault_s" in self.law.model_fields_set
+        if said != (self.schema_version > 1):
+            expected = "this member" if self.schema_version > 1 else "no such member in version 1"
+            raise FieldError("law.premise_fault_s", self.law.premise_fault_s if said else "nothing", expected)
         roles = [signal.role for signal in self.signals]
         if roles != sorted(roles, key=("state", "input", "parameter").index):
             raise FieldError("signals", roles, "states first, then inputs, then parameters")

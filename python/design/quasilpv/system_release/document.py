@@ -21,6 +21,7 @@ from quasilpv.documents.system_artifact import (
     PERFORMANCE,
     SAMPLING_METHODS,
     SCHEMA,
+    SCHEMA_VERSION,
     SamplingDocument,
     SystemArtifactDocument,
 )
@@ -56,7 +57,7 @@ def artifact_of(
     performance = {DISTURBANCE: request.disturbance, PERFORMANCE: request.performance}
     document = {
         "schema": SCHEMA,
-        "schema_version": 1,
+        "schema_version": SCHEMA_VERSION,
         "name": f"{system.name}-{1.0 / request.sample_period_s:.0f}hz",
         "creator": {"tool": "quasilpv", "version": __version__},
         "design_hash": document_hash(_inputs(request)),
@@ -74,6 +75,7 @@ def artifact_of(
             "kind": "regional-feedback",
             "gain": design.model.polytope.to_document(design.gains),
             "schedule": _compiled(tuple(told), numbers),
+            "premise_fault_s": request.premise_fault_s,
         },
         "region": {
             "lyapunov": _symmetric(design.lyapunov),

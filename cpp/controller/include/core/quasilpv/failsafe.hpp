@@ -44,7 +44,7 @@ struct FailsafeSettings {
   std::int64_t overrun_limit = 20;                ///< fault above so many consecutive overruns
   std::int64_t foreign_limit = 100;               ///< fault at so many consecutive foreign messages
   std::int64_t premise_degraded_ns = 20'000'000;  ///< degraded when outside the box for longer
-  std::int64_t premise_fault_ns = 1'000'000'000;  ///< fault when outside the box for longer; 0: never
+  std::int64_t premise_fault_ns = 1'000'000'000;  ///< fault when outside for longer; 0: never; < 0: at once
   std::int64_t ramp_ns = 40'000'000;              ///< from the last torque to the safe torque
 };
 

@@ -52,6 +52,8 @@ class SystemArtifact {
 
   const Program& schedule() const noexcept { return schedule_; }
   const BlockPolytope& gain() const noexcept { return gain_; }
+  /// For so long a premise may be outside its box, clamped, before that is a fault; 0: at once; infinite: always.
+  double premise_fault_s() const noexcept { return premise_fault_s_; }
   const Eigen::MatrixXd& lyapunov_inverse() const noexcept { return lyapunov_inverse_; }  ///< P^-1
 
   /// F(x', x, u, p) of all signals and rates.
@@ -73,6 +75,7 @@ class SystemArtifact {
   int differential_ = 0;
   Program schedule_;
   BlockPolytope gain_;
+  double premise_fault_s_ = 1.0;  // of version 1
   Eigen::MatrixXd lyapunov_inverse_;
   Program residual_;
   std::vector<Program> jacobian_;

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import Literal, TypeAlias, get_args
 
+from quasilpv.documents.system_artifact import PREMISE_FAULT_S
 from quasilpv.errors import InputError, one_of
 from quasilpv.systems.descriptor.system import DescriptorSystem
 
@@ -34,6 +35,8 @@ class RegionalRequest:
         disturbance: by name of an input, to which it is added, or of a differential state, to whose rate it is added:
             the size that counts as 1.
         performance: by name of a state or an input, the deviation that counts as 1.
+        premise_fault_s: for so long a premise may be outside its box, clamped, before the loop goes into a fault, s; 0:
+            at once, None: always.
 
     Raises:
         InputError: a number is out of range or a name is unknown.
@@ -48,6 +51,7 @@ class RegionalRequest:
     share: float = DEFAULT_SHARE
     disturbance: Mapping[str, float] = field(default_factory=dict)
     performance: Mapping[str, float] = field(default_factory=dict)
+    premise_fault_s: float | None = PREMISE_FAULT_S
 
     def __post_init__(self) -> None:
         """Refuse what has no meaning."""
@@ -63,6 +67,8 @@ class RegionalRequest:
         for name, value in numbers.items():
             if value is not None and not (isfinite(value) and value > 0.0):
                 raise InputError(source, name, value, "a finite number > 0")
+        if self.premise_fault_s is not None and not 0.0 <= self.premise_fault_s < inf:
+            raise InputError(source, "premise fault", self.premise_fault_s, "a finite time >= 0, s")
         if not 0.0 < self.share < 1.0:
             raise InputError(source, "share", self.share, "a number between 0 and 1")
         if not self.system.inputs:
