@@ -114,7 +114,12 @@ def holds_number(verb: str, parameter: Any) -> bool:
 
 def filled(metavar: str) -> list[str]:
     """``NAME=FROM:TO:POINTS`` with a hole for each number in turn."""
-    shape = {"VALUE": ["{}"], "FROM:TO": ["{}:2", "1:{}"], "FROM:TO:POINTS": ["{}:2:3", "1:{}:3", "1:2:{}"]}
+    shape = {
+        "VALUE": ["{}"],
+        "FORM": ["{}", "step:{},1", "step:1,{}", "step:1,2,{}", "sine:{},2", "sine:1,{}", "sine:1,2,{}", "noise:{}"],
+        "FROM:TO": ["{}:2", "1:{}"],
+        "FROM:TO:POINTS": ["{}:2:3", "1:{}:3", "1:2:{}"],
+    }
     return [f"b={numbers}" for numbers in shape[metavar.partition("=")[2]]]
 
 

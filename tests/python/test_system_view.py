@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import secrets
+import time
 import urllib.request
 from pathlib import Path
 
+import lcm
 import numpy as np
 import pytest
 from PIL import Image, ImageChops
@@ -18,10 +21,13 @@ from quasilpv.experiments.system_run import SystemExperiment, SystemRun, simulat
 from quasilpv.figures.animation import FRAMES_PER_SECOND
 from quasilpv.figures.phase import LONGEST_S, SHORTEST_S, PhasePortrait, write_phase_animation
 from quasilpv.release import release
+from quasilpv.scenarios.system_schema import ConstantDisturbance
 from quasilpv.synthesis import DesignRequest
 from quasilpv.telemetry import LOG_NAME, read_log
+from quasilpv.telemetry.message_types import channel_type
+from quasilpv.telemetry.system_recording import TELEMETRY, system_messages
 from quasilpv.view.plot_page import HOST
-from quasilpv.view.system_page import SystemPage, SystemTimeline, on_white, system_curves
+from quasilpv.view.system_page import LiveTimeline, SystemPage, SystemTimeline, on_white, system_curves
 from reference.released_systems import released
 
 PATIENCE_S = 20.0
@@ -137,9 +143,59 @@ def test_animate_takes_the_artifact_of_a_system_and_what_does_not_go_with_it_is_
         assert words in said
 
 
+def test_a_system_is_shown_as_it_runs() -> None:
+    pushed = ConstantDisturbance(signal="v", value=2000.0, begin_s=0.05)
+    seen = simulate(released("dc-bus"), SystemExperiment({}, {}, 0.1, disturbances=(pushed,)), "test")
+    artifact = seen.artifact
+    url = f"udpm://239.255.76.67:{49152 + secrets.randbelow(16384)}?ttl=0"
+    wire, live = lcm.LCM(url), LiveTimeline(url, artifact)
+    seq = np.arange(len(seen.time_s))
+    columns = {name: getattr(seen, name) for name in ("measured", "input", "commanded", "premise")}
+    records = system_messages(TELEMETRY, artifact, seq, columns)
+    records["level"] = seen.measured_level
+    lost = 40
+    records["measured"][lost] = np.nan
+    packets = list(channel_type(TELEMETRY).encode(records))
+
+    def heard(count: int) -> SystemTimeline:
+        deadline = time.monotonic() + PATIENCE_S
+        while (shown := live.poll()) is None or len(shown.run.time_s) < count:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        return shown
+
+    def send(first: int, last: int) -> None:
+        for packet in packets[first:last]:
+            wire.publish(TELEMETRY, packet)
+
+    page = None
+    try:
+        send(0, 30)
+        page = SystemPage(heard(30), 0, live)
+        before = [list(curves.labels) for curves in page._curves]
+        send(30, len(packets))
+        shown = heard(len(packets))
+        np.testing.assert_array_equal(shown.run.input, seen.input)
+        np.testing.assert_array_equal(shown.run.level, seen.measured_level)
+        np.testing.assert_array_equal(shown.run.state[lost], seen.measured[lost - 1])
+        page.step(1.0)
+        assert page.player.end_s == pytest.approx(seen.time_s[-1])
+        assert page.player.time_s == page.player.end_s
+        labels = [list(curves.labels) for curves in system_curves(shown)]
+        assert [list(curves.labels) for curves in page._curves] == labels != before  # the limits have come near
+        assert len(page._plots) == len(page._curves)
+    finally:
+        live.close()
+        if page is not None:
+            page.close()
+
+
 def test_view_draws_no_robot_beside_a_system(
     seen: SystemRun, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = write_log(tmp_path / LOG_NAME, seen)
     assert run(["view", "--log", str(path), "--robot", "ur5.toml"]) == 2
+    assert "a system is shown as curves" in capsys.readouterr().err
+    artifact = write_system_artifact(tmp_path / "made", seen.artifact)[0]
+    assert run(["view", "--live", "--artifact", str(artifact), "--robot", "ur5.toml"]) == 2
     assert "a system is shown as curves" in capsys.readouterr().err

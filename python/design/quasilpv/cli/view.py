@@ -7,7 +7,7 @@ import sys
 import time
 import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -19,12 +19,13 @@ from quasilpv.errors import InputError, TransportError
 if TYPE_CHECKING:
     from quasilpv.artifact import Artifact
     from quasilpv.descriptions.meshes import BodyMesh
+    from quasilpv.documents.system_artifact import SystemArtifactDocument
     from quasilpv.systems.robots.drawing import Drawing
     from quasilpv.telemetry import RunLog
-    from quasilpv.view.live import LiveMotion
-    from quasilpv.view.playback import Motion
+    from quasilpv.view.live import Live
     from quasilpv.view.plot_page import PlotPage
 
+Shown = TypeVar("Shown")
 FRAME_S = 1.0 / 30.0
 
 
@@ -62,8 +63,8 @@ def view_command(
 ) -> None:
     """Show a run on a local web page: the robot, its reference, errors, torques, disturbance, premises, step times.
 
-    Pause, scrub, change the speed; drag to turn the scene. Of a general system: its signals, V and step times as
-    curves, its phase portraits with the region. The page is served on the loopback interface only, until Ctrl-C.
+    Pause, scrub, change the speed; drag to turn the scene. Of a general system, live too: its signals, V and step times
+    as curves, its phase portraits with the region. The page is served on the loopback interface only, until Ctrl-C.
 
     \b
     Examples:
@@ -72,16 +73,22 @@ def view_command(
       design view --live --artifact out/arm3/artifact.json
     """
     from quasilpv.artifact import read_artifact
+    from quasilpv.artifact.system_store import read_system_artifact
     from quasilpv.experiments.logged import mechanism_of
     from quasilpv.view.live import LiveMotion
     from quasilpv.view.page import Page
     from quasilpv.view.playback import Motion, Playback
 
     listener, source = None, ""
+    drawn = robot or scenario or next(iter(meshes or []), None)
     if live:
         if artifact is None or log is not None:
             got = "no --artifact" if artifact is None else f"--log {log}"
             raise InputError("command line", "--live", got, "--artifact FILE and no --log")
+        system = read_system_artifact(artifact)
+        if system is not None:
+            _show_live_system(system, url, timeout_s, port, browser, drawn_robot=drawn)
+            return
         controller = read_artifact(artifact)
         listener = LiveMotion(url, controller)
         motion, title = _first_samples(listener, url, timeout_s), f"live: {controller.name}"
@@ -89,7 +96,7 @@ def view_command(
     else:
         recorded = open_log(log or LAST, artifact)
         if recorded.is_of_system:
-            _show_system(recorded, port, at, browser, drawn_robot=robot or scenario or next(iter(meshes or []), None))
+            _show_system(recorded, port, at, browser, drawn_robot=drawn)
             return
         controller, motion = recorded.artifact, Motion.of_log(recorded)
         mechanism = mechanism_of(recorded.scenario.plant)
@@ -102,10 +109,30 @@ def view_command(
 def _show_system(log: RunLog, port: int, at: float | None, browser: bool | None, *, drawn_robot: Path | None) -> None:
     from quasilpv.view.system_page import SystemPage, SystemTimeline
 
-    if drawn_robot is not None:
-        expected = "a log of a robot: a system is shown as curves and phase portraits"
-        raise InputError("command line", "--robot, --meshes or --scenario", str(drawn_robot), expected)
+    _refuse_drawn(drawn_robot)
     _serve(SystemPage(SystemTimeline.of_log(log, shlex.quote(log.source)), port), at, browser)
+
+
+def _show_live_system(
+    artifact: SystemArtifactDocument,
+    url: str,
+    timeout_s: float,
+    port: int,
+    browser: bool | None,
+    *,
+    drawn_robot: Path | None,
+) -> None:
+    from quasilpv.view.system_page import LiveTimeline, SystemPage
+
+    _refuse_drawn(drawn_robot)
+    listener = LiveTimeline(url, artifact)
+    _serve(SystemPage(_first_samples(listener, url, timeout_s), port, listener), None, browser)
+
+
+def _refuse_drawn(drawn_robot: Path | None) -> None:
+    if drawn_robot is not None:
+        expected = "a log or an artifact of a robot: a system is shown as curves and phase portraits"
+        raise InputError("command line", "--robot, --meshes or --scenario", str(drawn_robot), expected)
 
 
 def _serve(page: PlotPage, at: float | None, browser: bool | None) -> None:
@@ -153,17 +180,17 @@ def _run(page: PlotPage) -> None:
         page.close()
 
 
-def _first_samples(listener: LiveMotion, url: str, timeout_s: float) -> Motion:
+def _first_samples(listener: Live[Shown], url: str, timeout_s: float) -> Shown:
     deadline = time.monotonic() + timeout_s
     print_note(f"waiting for telemetry on {url}")
-    while (motion := listener.poll()) is None:
+    while (shown := listener.poll()) is None:
         if time.monotonic() > deadline:
             heard = (
                 ", ".join(f"{count} of {reason}" for reason, count in listener.refused.items() if count) or "nothing"
             )
             raise TransportError(f"{url}: no telemetry of this artifact within {timeout_s:g} s; heard {heard}")
         time.sleep(FRAME_S)
-    return motion
+    return shown
 
 
 def _mechanism(controller: Artifact, scenario: Path | None) -> Drawing:

@@ -32,22 +32,27 @@ class PhasePortrait:
 
     def __init__(self, run: SystemRun, dots_per_inch: int = DOTS_PER_INCH) -> None:
         """Draw what does not move."""
-        self._run = run
         self._scale = dots_per_inch / DOTS_PER_INCH
         figure = region_figure(run, faint=True)
         figure.set_dpi(dots_per_inch)
         canvas: Any = FigureCanvasAgg(figure)
         canvas.draw()
         self._still = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-        height = self._still.height
-        pairs = planes_of(run)
-        self._paths = []
-        for axes, (i, j) in zip(figure.axes, pairs, strict=False):
-            points = axes.transData.transform(run.state[:, [i, j]])
-            self._paths.append(np.column_stack([points[:, 0], height - points[:, 1]]))
+        # Of every plane, its two states and the way to pixels.
+        self._planes: list[tuple[tuple[int, int], Any]] = [
+            (pair, axes.transData.frozen()) for pair, axes in zip(planes_of(run), figure.axes, strict=False)
+        ]
+        self.follow(run)
         self._font = ImageFont.truetype(
             str(Path(mpl.get_data_path()) / "fonts/ttf/DejaVuSans.ttf"), round(12 * self._scale)
         )
+
+    def follow(self, run: SystemRun) -> None:
+        """Go on with another run of the same controller, in the same picture."""
+        self._run, self._paths = run, []
+        for pair, to_pixels in self._planes:
+            points = to_pixels.transform(run.state[:, list(pair)])
+            self._paths.append(np.column_stack([points[:, 0], self._still.height - points[:, 1]]))
 
     def frame(self, sample: int) -> Image.Image:
         """The picture at a sample."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, TypeAlias
 
@@ -106,20 +106,6 @@ class Motion:
     def samples(self) -> int:
         """N."""
         return int(self.time_s.size)
-
-    def __getitem__(self, rows: slice | IntArray) -> Motion:
-        """Some of the samples."""
-        return Motion(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
-
-    def followed_by(self, later: Motion, window_s: float) -> Motion:
-        """The last ``window_s`` of these samples and those after them."""
-        joined = Motion(
-            **{
-                field.name: np.concatenate([getattr(self, field.name), getattr(later, field.name)])
-                for field in fields(self)
-            }
-        )
-        return joined[slice(int(np.searchsorted(joined.time_s, joined.time_s[-1] - window_s)), None)]
 
     def sample_at(self, time_s: float) -> int:
         """Index of the last sample that is not later than a time; 0 before the first."""

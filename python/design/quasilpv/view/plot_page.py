@@ -166,15 +166,22 @@ class PlotPage(ABC):
         self._timeline = shown
         self.player.follow(shown.begin_s, shown.end_s)
         self._time.min, self._time.max = shown.begin_s, max(shown.end_s, shown.begin_s + 1e-3)
-        self._curves = self._curves_now()
-        while len(self._plots) < len(self._curves):
-            self._plots.append(self._add_plot(self._curves[len(self._plots)]))
+        before, self._curves = self._curves, self._curves_now()
+        if [list(curves.labels) for curves in before] != [list(curves.labels) for curves in self._curves]:
+            self._plot_anew()
         for plot, curves in zip(self._plots, self._curves, strict=True):
             plot.scales = self._scales(curves)
         histogram = step_histogram(shown.step_us)
         if histogram is not None and self._histogram is not None:
             self._histogram.data = (histogram.edge, histogram.count)
             self._histogram.title = histogram.title
+
+    def _plot_anew(self) -> None:
+        """Plots in place of those there are, which have other lines."""
+        for plot in (*self._plots, *([] if self._histogram is None else [self._histogram])):
+            plot.remove()
+        self._plots = [self._add_plot(curves) for curves in self._curves]
+        self._histogram = self._add_histogram()
 
     # ---- controls and plots ----------------------------------------------------------------------------------------
 

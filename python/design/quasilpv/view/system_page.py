@@ -12,16 +12,19 @@ import viser
 from PIL import Image
 
 from quasilpv.arrays import FloatArray
-from quasilpv.documents.system_artifact import Signal
+from quasilpv.documents.system_artifact import Signal, SystemArtifactDocument
 from quasilpv.experiments.system_logged import logged_system_run
-from quasilpv.experiments.system_run import SystemRun
+from quasilpv.experiments.system_run import SystemExperiment, SystemRun, scenario_of
 from quasilpv.figures.phase import SHORTEST_S, PhasePortrait
 from quasilpv.figures.style import BLACK, BLUE, GREEN, REFERENCE_COLOUR, VERMILION
 from quasilpv.telemetry import RunLog
 from quasilpv.telemetry.codes import STATES, SYSTEM_FLAGS, word
+from quasilpv.telemetry.message_types import Records
+from quasilpv.telemetry.system_recording import TELEMETRY, system_columns_of
 from quasilpv.view.curves import MAX_POINTS, Curves
+from quasilpv.view.live import Live
 from quasilpv.view.playback import SPEEDS
-from quasilpv.view.plot_page import PlotPage
+from quasilpv.view.plot_page import PLOT_PERIOD_S, PlotPage
 
 NEAR = 3.0
 """A limit is plotted if a signal comes within so many times its own largest magnitude."""
@@ -61,6 +64,32 @@ class SystemTimeline:
             1e-3 * telemetry["step_ns"][known],
             source,
         )
+
+    @classmethod
+    def of_telemetry(cls, records: Records, artifact: SystemArtifactDocument) -> Self:
+        """What telemetry alone tells, samples in order: the measured states are the truth.
+
+        A state that was not measured is where it was last.
+        """
+        columns = system_columns_of(TELEMETRY, records, artifact)
+        known = np.isfinite(columns["measured"])
+        last = np.maximum.accumulate(np.where(known, np.arange(len(known))[:, None], 0), axis=0)
+        measured = np.nan_to_num(np.take_along_axis(columns["measured"], last, axis=0))
+        run = SystemRun(
+            artifact=artifact,
+            scenario=scenario_of(artifact, SystemExperiment({}, {}), artifact.name),
+            time_s=records["seq"] * artifact.sample_period_s,
+            state=measured,
+            measured=measured,
+            input=columns["input"],
+            commanded=columns["commanded"],
+            premise=columns["premise"],
+            level=np.nan_to_num(np.array(records["level"])),
+            measured_level=np.array(records["level"]),
+            sample_flags=records["flags"].astype(np.int64),
+            exit=None,
+        )
+        return cls(f"live: {artifact.name}", run, records["state"].astype(np.int64), 1e-3 * records["step_ns"])
 
     @property
     def begin_s(self) -> float:
@@ -127,27 +156,52 @@ def _signal_curves(timeline: SystemTimeline, place: int, signal: Signal) -> Curv
     )
 
 
+class LiveTimeline(Live[SystemTimeline]):
+    """The last seconds of a general system as it runs. Errors: `quasilpv.view.live.Live`."""
+
+    def __init__(self, url: str, artifact: SystemArtifactDocument) -> None:
+        """Listen."""
+        self._artifact = artifact
+        super().__init__(url, TELEMETRY, artifact.hash, artifact.sample_period_s)
+
+    def _made(self, records: Records) -> SystemTimeline:
+        return SystemTimeline.of_telemetry(records, self._artifact)
+
+
 class SystemPage(PlotPage):
     """A page, served from creation to `close`; `step` is to be called some thirty times a second.
 
     Args:
-        timeline: what is shown.
+        timeline: what is shown; of a live run, what there is of it so far.
         port: on the loopback interface.
+        live: where the rest of a live run comes from; None for a run that is over.
 
     Raises:
         InputError: the port is taken.
     """
 
-    def __init__(self, timeline: SystemTimeline, port: int) -> None:
+    def __init__(self, timeline: SystemTimeline, port: int, live: LiveTimeline | None = None) -> None:
         """Serve."""
-        super().__init__(timeline, port)
-        self._shown_run = timeline
+        super().__init__(timeline, port, live=live is not None)
+        self._shown_run, self._live = timeline, live
         self._portrait = PhasePortrait(timeline.run, DOTS_PER_INCH)
         self._client: viser.ClientHandle | None = None
         self._pictured: tuple[int, float] | None = None
         duration = timeline.end_s - timeline.begin_s
-        self.player.speed = max((speed for speed in SPEEDS if duration >= speed * SHORTEST_S), default=SPEEDS[0])
+        if live is None:
+            self.player.speed = max((speed for speed in SPEEDS if duration >= speed * SHORTEST_S), default=SPEEDS[0])
         self.show_first()
+
+    def _pass_time(self, elapsed_s: float) -> None:
+        if self._live is None:
+            super()._pass_time(elapsed_s)
+            return
+        timeline = self._live.poll()
+        if timeline is None or timeline is self._shown_run or self._since_plots_s < PLOT_PERIOD_S:
+            return
+        self._shown_run, self._pictured = timeline, None
+        self._portrait.follow(timeline.run)
+        self._show_grown(timeline)
 
     def _welcome(self, client: viser.ClientHandle) -> None:
         super()._welcome(client)
