@@ -11,7 +11,7 @@ from quasilpv.certificate import LAWS
 from quasilpv.certificate.gate.motor_loop import CorrectionSource
 from quasilpv.documents.design_inertia import DesignInertia
 from quasilpv.documents.strict_model import NonNegative, Number, Positive, StrictModel
-from quasilpv.documents.tables import Intervals, Matrix, PolytopeTable, PositiveVector, Vector
+from quasilpv.documents.tables import Intervals, Matrix, NonNegativeVector, PolytopeTable, PositiveVector, Vector
 
 ROOT = Path(__file__).parents[2]
 REGISTRY = Path("cpp/controller/src/laws/registry.cpp")
@@ -28,6 +28,7 @@ NAMES_OF_TYPES: list[tuple[Any, str]] = [
     (Vector, "joint-values"),
     (Intervals, "intervals"),
     (PositiveVector, "positive-joint-values"),
+    (NonNegativeVector, "non-negative-joint-values"),
     (Matrix, "matrix"),
     (tuple[Matrix, ...], "matrices"),
     (PolytopeTable, "polytope"),

@@ -17,7 +17,7 @@ from quasilpv.errors import InputError
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.experiments.track import track
 from quasilpv.loops.elastic_loop import ElasticPlant
-from quasilpv.loops.link_loop import LinkLaw, link_growth_rate
+from quasilpv.loops.link_loop import LinkLaw, link_growth_rate, link_matrix, slips
 from quasilpv.release import checked_artifact
 from quasilpv.scenarios.registry import tracking_experiment
 from quasilpv.synthesis import DesignRequest, default_controller, synthesise
@@ -44,11 +44,17 @@ def runtime_of(artifact: Artifact) -> _runtime.Artifact:
     return _runtime.Artifact.parse(canonical_json(artifact.to_document()), "test")
 
 
-@pytest.mark.parametrize("torque_nm", [1e7, 60.0], ids=["no limit", "limits act"])
-def test_when_the_law_steps_expect_the_recursion(torque_nm: float) -> None:
+@pytest.mark.parametrize(
+    ("torque_nm", "zone", "samples"),
+    [(1e7, None, 60), (60.0, None, 60), (1e7, [3e-4, 0.0, 1.0, 5e-5], 900)],
+    ids=["no limit", "limits act", "at rest"],
+)
+def test_when_the_law_steps_expect_the_recursion(torque_nm: float, zone: list[float] | None, samples: int) -> None:
     rng = np.random.default_rng(12)
     tree = random_tree(rng, 4)
-    controller = _runtime.Controller(runtime_of(tree_artifact(tree, LAW, torque_nm=torque_nm)))
+    members = LAW if zone is None else {**LAW, "dead_zone_rad": zone}
+    controller = _runtime.Controller(runtime_of(tree_artifact(tree, members, torque_nm=torque_nm)))
+    widths, near_s, waited = np.array(zone or [0.0] * 4), np.zeros(4), np.zeros(4)
     B, K, D = (np.array(LAW[name]) for name in ("rotor_inertia_kg_m2", "stiffness_nm_rad", "relative_damping_nm_s"))
     viscous, coulomb = np.array(LAW["friction_viscous_nm_s"]), np.array(LAW["friction_coulomb_nm"])
     kp, kd, ki = LAW["feedback"].values()
@@ -57,7 +63,9 @@ def test_when_the_law_steps_expect_the_recursion(torque_nm: float) -> None:
     th, w, d, j, df, e_I = start.copy(), *np.zeros((5, 4))
     before: Any = None
     limited = 0
-    for k in range(60):
+    for k in range(samples):
+        if zone is not None and k == 20:
+            start, ways = start + ways * np.sin(6 * k * T), np.zeros(4)
         r, rd, rdd = start + ways * np.sin(6 * k * T), 6 * ways * np.cos(6 * k * T), -36 * ways * np.sin(6 * k * T)
         y = r + 1e-4 * rng.normal(size=4)
         if k == 0:
@@ -71,12 +79,15 @@ def test_when_the_law_steps_expect_the_recursion(torque_nm: float) -> None:
         damping = D / T * (unforeseen - before) if told and before is not None else np.zeros(4)
         before = unforeseen if told else None
         th, w, d, j = (x + gain * (y - th) for x, gain in zip((th, w, d, j), LAW["observer"], strict=True))
-        df = pole * df + (1.0 - pole) * d
+        near_s = np.where((np.abs(y - r) > widths) | (np.abs(rd) > widths), 0.0, near_s + T)
+        waits = (near_s > 0.5 - T / 2) & (widths > 0.0)
+        waited += waits
+        df = np.where(waits, df, pole * df + (1.0 - pole) * d)
         a = kp * (th - r) + kd * (w - rd) + ki * e_I - df
         M = tree.inertia(y)
         torque = fed + viscous * rd + coulomb * np.tanh(rd / 0.01) + s * M @ a - damping
         applied = np.clip(torque, -torque_nm, torque_nm)
-        scale = max(1.0, float(np.abs(torque).max()))
+        scale = max(1.0, float(np.abs(torque).max())) * samples / 60  # rounding adds up over the samples
         np.testing.assert_allclose(report.torque_applied[:4], applied, rtol=0, atol=1e-12 * scale)
         limited += int((applied != torque).sum())
         np.testing.assert_allclose(report.integral_error[:4], e_I, rtol=0, atol=1e-12)
@@ -85,6 +96,7 @@ def test_when_the_law_steps_expect_the_recursion(torque_nm: float) -> None:
         th = th + T * w + T**2 / 2.0 * held + T**3 / 6.0 * j
         w, d = w + T * held + T**2 / 2.0 * j, d + T * j
     assert (limited > 0) == (torque_nm < 1e7)
+    assert (waited > 0).tolist() == [False, False, zone is not None, False]
 
 
 def blocked(commanded: np.ndarray, applied: np.ndarray, grows: np.ndarray) -> np.ndarray:
@@ -127,6 +139,24 @@ def test_when_a_loop_is_run_on_unit_states_expect_its_growth_rate(delay: float) 
     assert link_growth_rate(law, plant, inertia, delay * T) == pytest.approx(rate, rel=1e-6)
 
 
+def test_when_a_motor_breaks_away_expect_it_as_far_as_its_loop_goes_before_it_turns_back() -> None:
+    """A step of torque at one motor of an arm of two; heavier links are held more firmly by nothing but the law."""
+    arm = ElasticPlant(np.diag([2.0, 1.0]), np.array([0.4, 0.2]), np.array([9e3, 5e3]), np.array([1.5, 1.0]))
+    inertia = arm.links + np.diag(arm.rotors)
+    law = LinkLaw(T, np.array([-900.0, -60.0, 0.0]), np.array(LAW["observer"]), 0.01, 0.8, np.array([60.0, 30.0]))
+    matrix, push = link_matrix(law, arm, inertia, 5e-4), arm.held(T, np.ones(2))[1]
+    for j, far in enumerate(slips(law, arm, inertia, 5e-4)):
+        forced = np.concatenate([push[:, j], np.zeros(len(matrix) - 8)])
+        state, motor = np.zeros(len(matrix)), [0.0]
+        for _ in range(400):
+            state = matrix @ state + forced
+            motor.append(state[2 + j])
+        turns = next(k for k in range(1, 400) if motor[k + 1] < motor[k])
+        assert 0 < turns < 100
+        assert far == pytest.approx(motor[turns], rel=1e-12)
+        assert 1e-5 < far < 1.0 / (0.8 * inertia[j, j] * 900.0) * 2.0
+
+
 @cache
 def designed() -> Artifact:
     return checked_artifact(synthesise(DesignRequest.of(elastic_ur5(side="both", uncertainty=2.0), "link-damped")))
@@ -143,6 +173,8 @@ def test_when_encoders_sit_on_both_sides_expect_a_gridded_design_that_is_asked_f
     assert report["worst_growth_rate_per_s"] < 0.0
     assert "gate" not in artifact.verification
     assert artifact.law.feedback.ki == 0.0
+    assert len(artifact.law.dead_zone_rad) == 6
+    assert min(artifact.law.dead_zone_rad) > 6 * math.pi / 2**20
     setup = RunSetup(
         tracking_experiment("ur5-circle").by(robot), artifact, plant="perturbed", transport_delay_s=T / 2, log=False
     )

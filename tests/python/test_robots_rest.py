@@ -12,23 +12,25 @@ COUNT_URAD = 6.0
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("law", [DEFAULT_CONTROLLER, "motor-pid"])
+@pytest.mark.parametrize("law", [DEFAULT_CONTROLLER, "motor-pid", "link-damped"])
 def test_an_arm_whose_joints_stick_rests_by_the_rule_that_ships_and_hunts_with_its_integral_on(law: str) -> None:
+    """Of `link-damped` a wrist that the rule leaves alone while it slides at 1 c creeps on, but does not come back."""
     found = {(row.rule, row.breakaway): row.worst_urad for row in rows(law, (1.0, 1.8))}
     print(law, found)
     for breakaway in (1.0, 1.8):
-        assert found[SHIPPED, breakaway] < 2.0 * COUNT_URAD
+        creeps = law == "link-damped" and breakaway == 1.0
+        assert found[SHIPPED, breakaway] < (10.0 if creeps else 2.0) * COUNT_URAD
     assert found[INTEGRATING, 1.8] > 10.0 * COUNT_URAD
 
 
 def test_a_table_has_a_row_per_law_and_rule_and_a_column_per_friction() -> None:
     found = [
-        Row("a", rule, ratio, (1.0, 10.0 * ratio + 2.0), 0.0) for rule in (SHIPPED, INTEGRATING) for ratio in (0.0, 1.8)
+        Row("a", rule, ratio, (1.0, 10.0 * ratio + 2.0), 7.0) for rule in (SHIPPED, INTEGRATING) for ratio in (0.0, 1.8)
     ]
     assert list(table(found)) == [
         "| law | rule | smooth | break-away 1.8 c |",
         "|---|---|---|---|",
-        "| `a` | shipped | 2 | 20 |",
-        "| `a` | integral on | 2 | 20 |",
+        "| `a` | shipped | 2 / 7 | 20 / 7 |",
+        "| `a` | integral on | 2 / 7 | 20 / 7 |",
     ]
     assert {DEFAULT_CONTROLLER, "motor-pid"} <= set(LAWS)

@@ -123,6 +123,7 @@ LawTable<ComputedTorqueParameters> table_of(const char* kind) {
   law.joint_values("gd", &P::gd);
   law.joint_values("gi", &P::gi);
   law.non_negative("velocity_filter_time_constant_s", &P::velocity_filter_time_constant_s);
+  law.optional_non_negative_joint_values("dead_zone_rad", &P::dead_zone);
   law.non_negative(kBandwidth, &P::observer_bandwidth_rad_s);
   law.torque_program("coriolis", &P::bias, {0, true, false});
   return law;

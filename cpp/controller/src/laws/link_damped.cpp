@@ -15,6 +15,7 @@ struct LinkDampedParameters final : ObserverParameters {
   JointArray relative_damping{};  ///< D_s of the gears by the motors, N m s/rad
   JointArray viscous{};           ///< of the motors, N m s/rad, as far as it is known
   JointArray coulomb{};           ///< likewise, N m
+  JointArray dead_zone{};         ///< at rest errors up to this do not move what compensates the disturbance, rad
 
   AngleSide controlled_side() const noexcept override { return AngleSide::kLink; }
   std::unique_ptr<ControlLaw> make_law(const LawSettings& settings) const override;
@@ -26,7 +27,7 @@ struct LinkDampedParameters final : ObserverParameters {
 ///
 ///     F      = ID(r, r', r'') + f r' + c tanh(r' / w_0)                        f, c: friction of the motors
 ///     x_hat += [l1, l2, l3, l4] (y - th)                                          current estimator
-///     d_f    = q d_f + (1 - q) a_d,  q = exp(-T/T_f)                              exact filter
+///     d_f    = q d_f + (1 - q) a_d,  q = exp(-T/T_f), unless the joint has been near a resting reference for long
 ///     a      = kp (th - r) + kd (w - r') + ki e_I - d_f
 ///     u      = th_m - y - K^-1 (ID(r, r', r'') - B r'')                            wound beside what was foreseen
 ///     Gamma  = F + s M(y) a - D_s (u - u_before) / T, limited
@@ -45,12 +46,20 @@ class LinkDampedLaw final : public AccelerationLaw<N> {
         feedforward_(parameters.model, parameters.viscous, parameters.coulomb),
         rotor_(from_array<N>(parameters.rotor_inertia)),
         stiffness_(from_array<N>(parameters.stiffness)),
+        dead_zone_(from_array<N>(parameters.dead_zone)),
+        sample_period_s_(settings.sample_period_s),
         damping_per_sample_(from_array<N>(parameters.relative_damping) / settings.sample_period_s) {}
 
  private:
   using typename AccelerationLaw<N>::Motion;
 
-  void begin() noexcept override { was_wound_ = false; }
+  // Before a joint is left alone its observer has that long to find what holds it there.
+  static constexpr double kSettlingS = 0.5;
+
+  void begin() noexcept override {
+    was_wound_ = false;
+    near_s_.setZero();
+  }
 
   void sense(const StepInput& input) noexcept override {
     sensed_ = input.valid && input.gears.has(kMotorAngle);
@@ -72,6 +81,12 @@ class LinkDampedLaw final : public AccelerationLaw<N> {
     was_wound_ = sensed_;
     fed_forward_ += feedforward_.friction(reference.speed);
     return reference;
+  }
+
+  JointMask<N> compensated(const JointVector<N>& y, const ReferenceVectors<N>& reference) noexcept override {
+    const JointMask<N> away = moving_or_outside<N>(dead_zone_, y - reference.angle, reference.speed);
+    near_s_ = away.select(JointVector<N>::Zero(), (near_s_.array() + sample_period_s_).min(kSettlingS).matrix());
+    return near_s_.array() < kSettlingS;
   }
 
   Command<N> control(const ObserverState<N>& state, const ModelSample<N>& model, const ReferenceVectors<N>& reference,
@@ -104,12 +119,15 @@ class LinkDampedLaw final : public AccelerationLaw<N> {
   LinkFeedforward<N> feedforward_;
   JointVector<N> rotor_;
   JointVector<N> stiffness_;
+  JointVector<N> dead_zone_;
+  double sample_period_s_;
   JointVector<N> damping_per_sample_;                    // D_s / T
   JointVector<N> fed_forward_ = JointVector<N>::Zero();  // F
   JointVector<N> fed_back_ = JointVector<N>::Zero();     // a
   JointVector<N> damping_ = JointVector<N>::Zero();      // torque of this sample
   JointVector<N> wound_ = JointVector<N>::Zero();
   JointVector<N> before_ = JointVector<N>::Zero();  // u of the sample before
+  JointVector<N> near_s_ = JointVector<N>::Zero();  // for how long the joint has been near a reference that rests
   bool sensed_ = false;
   bool was_wound_ = false;
 };
@@ -134,6 +152,7 @@ LawKind link_damped() {
   law.joint_values("relative_damping_nm_s", &P::relative_damping);
   law.joint_values("friction_viscous_nm_s", &P::viscous);
   law.joint_values("friction_coulomb_nm", &P::coulomb);
+  law.optional_non_negative_joint_values("dead_zone_rad", &P::dead_zone);
   law.finish(require_chain<P>);
   return law.kind();
 }

@@ -59,16 +59,15 @@ class MotorPidLaw final : public AccelerationLaw<N> {
         feedforward_(parameters.model, parameters.viscous, parameters.coulomb),
         rotor_(from_array<N>(parameters.rotor_inertia)),
         stiffness_(from_array<N>(parameters.stiffness)),
+        dead_zone_(JointVector<N>::Constant(parameters.dead_zone)),
         correction_pole_(std::exp(-parameters.correction_bandwidth * settings.sample_period_s)) {}
 
  private:
   using typename AccelerationLaw<N>::Motion;
-  using Away = Eigen::Array<bool, N, 1>;
 
-  /// Which motors are farther from their reference than the dead zone; all, without one.
-  Away away(const ModelSample<N>& model, const ReferenceVectors<N>& reference) const noexcept {
-    return (model.angle - reference.angle).array().abs() > parameters_.dead_zone ||
-           Away::Constant(parameters_.dead_zone == 0.0);
+  /// Which motors are away from their reference.
+  JointMask<N> away(const ModelSample<N>& model, const ReferenceVectors<N>& reference) const noexcept {
+    return outside<N>(dead_zone_, model.angle - reference.angle);
   }
 
   void sense(const StepInput& input) noexcept override {
@@ -101,7 +100,7 @@ class MotorPidLaw final : public AccelerationLaw<N> {
     const JointVector<N> acceleration =
         reference.acceleration + parameters_.feedback.kp * (state.angle - reference.angle) +
         parameters_.feedback.kd * (state.speed - reference.speed) + parameters_.feedback.ki * state.integral_error;
-    // A joint without a gain is not integrated: a motor that sticks is left alone where it is near enough.
+    // A joint without a gain is not integrated.
     const JointVector<N> gain = away(model, reference).select(JointVector<N>::Constant(parameters_.feedback.ki), 0.0);
     return {rotor_.cwiseProduct(acceleration) + fed_forward_, gain};
   }
@@ -119,7 +118,7 @@ class MotorPidLaw final : public AccelerationLaw<N> {
   }
 
   /// Of motors that are away: otherwise it drags the reference out from under a motor that sticks.
-  void follow(const JointVector<N>& unforeseen, const Away& away) noexcept {
+  void follow(const JointVector<N>& unforeseen, const JointMask<N>& away) noexcept {
     const JointVector<N> share = away.select(JointVector<N>::Constant(1.0 - correction_pole_), 0.0);
     lagging_ += share.cwiseProduct(unforeseen - lagging_);
     correction_ += share.cwiseProduct(lagging_ - correction_);
@@ -129,6 +128,7 @@ class MotorPidLaw final : public AccelerationLaw<N> {
   LinkFeedforward<N> feedforward_;
   JointVector<N> rotor_;
   JointVector<N> stiffness_;
+  JointVector<N> dead_zone_;
   double correction_pole_;
   JointVector<N> fed_forward_ = JointVector<N>::Zero();  // tau_r and friction
   JointVector<N> foreseen_ = JointVector<N>::Zero();     // K^-1 tau_r

@@ -73,6 +73,7 @@ LawKind pid() {
   law.joint_values("kd", &P::kd);
   law.joint_values("ki", &P::ki);
   law.non_negative("velocity_filter_time_constant_s", &P::velocity_filter_time_constant_s);
+  law.optional_non_negative_joint_values("dead_zone_rad", &P::dead_zone);
   law.torque_program("coriolis_reference", &P::coriolis_reference, {0, true, true});
   return law.kind();
 }

@@ -9,7 +9,7 @@ from pydantic import SerializerFunctionWrapHandler, model_serializer, model_vali
 
 from quasilpv.documents.design_inertia import DesignInertia
 from quasilpv.documents.strict_model import FieldError, NonNegative, Number, StrictModel
-from quasilpv.documents.tables import PolytopeTable, Vector
+from quasilpv.documents.tables import NonNegativeVector, PolytopeTable, Vector, require_size
 
 Level: TypeAlias = Literal["acceleration", "torque"]
 
@@ -140,3 +140,22 @@ class ChainLaw(OptionalMemberLaw):
         if self.gravity_load is not None and isinstance(self.inertia, PolytopeTable):
             expected = "none beside an inertia by vertices, whose gravity is a program"
             raise FieldError("law.gravity_load", "a load", expected)
+
+
+class RestingLaw(ChainLaw):
+    """A law that may have a rule of rest.
+
+    Attributes:
+        dead_zone_rad: per joint: while the reference rests and the error is at most this, what integrates it waits, so
+            that a joint that sticks does not hunt; 0, or none at all: it never waits.
+    """
+
+    optional: ClassVar[Mapping[str, str]] = {**ChainLaw.optional, "dead_zone_rad": "an angle per joint"}
+
+    dead_zone_rad: NonNegativeVector | None = None
+
+    def check(self, joints: int) -> None:
+        """See `LawDocument.check`."""
+        super().check(joints)
+        if self.dead_zone_rad is not None:
+            require_size("law.dead_zone_rad", self.dead_zone_rad, joints)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from quasilpv.documents.strict_model import FieldError, Number, Positive, StrictModel
+from quasilpv.documents.strict_model import FieldError, NonNegative, Number, Positive, StrictModel
 
 MAX_PREMISES = 32
 ROUNDING = 1e-12
@@ -17,6 +17,7 @@ ROUNDING = 1e-12
 Vector = tuple[Number, ...]
 Matrix = tuple[Vector, ...]
 PositiveVector = tuple[Positive, ...]
+NonNegativeVector = tuple[NonNegative, ...]
 Intervals = tuple[tuple[Number, Number], ...]
 
 

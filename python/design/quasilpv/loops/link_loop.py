@@ -6,7 +6,7 @@ The plant is that of `quasilpv.loops.elastic_loop`, its commands the motors' tor
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,8 +35,39 @@ class LinkLaw:
     relative_damping: FloatArray
 
 
+SLIP_SAMPLES = 1000
+"""After which a motor that slips has turned back."""
+
+
 def link_growth_rate(law: LinkLaw, plant: ElasticPlant, inertia: FloatArray, delay_s: float) -> float:
-    """``log(spectral radius) / T`` of the frozen loop, 1/s; negative when stable.
+    """``log(spectral radius) / T`` of the frozen loop, 1/s; negative when stable. See `link_matrix`."""
+    matrix = link_matrix(law, plant, inertia, delay_s)
+    return float(np.log(np.abs(np.linalg.eigvals(matrix)).max()) / law.sample_period_s)
+
+
+def slips(law: LinkLaw, plant: ElasticPlant, inertia: FloatArray, delay_s: float) -> FloatArray:
+    """How far a motor goes that breaks away, until it turns back and can stick again, rad/(N m), (n,).
+
+    Friction falls when a motor breaks away: that is a step of torque at this motor, to which the frozen loop of all
+    joints responds. Arguments are those of `link_matrix`.
+    """
+    n = len(plant.rotors)
+    matrix = link_matrix(law, plant, inertia, delay_s)
+    pushed = np.zeros((len(matrix), n))
+    pushed[: 4 * n] = replace(plant, lag_s=0.0).held(law.sample_period_s, np.ones(n))[1]
+    states, reached, going = np.zeros_like(pushed), np.zeros(n), np.ones(n, dtype=bool)
+    for _ in range(SLIP_SAMPLES):
+        states = matrix @ states + pushed
+        motors = states[n : 2 * n].diagonal()
+        going &= motors >= reached
+        reached = np.where(going, motors, reached)
+        if not going.any():
+            break
+    return reached
+
+
+def link_matrix(law: LinkLaw, plant: ElasticPlant, inertia: FloatArray, delay_s: float) -> FloatArray:
+    """The map of all states from a sample to the next.
 
     States: the plant's; predicted angle, speed, disturbance and its rate, filtered disturbance, integral, and how far
     the gears were wound; torques on their way, the youngest first.
@@ -81,4 +112,4 @@ def link_growth_rate(law: LinkLaw, plant: ElasticPlant, inertia: FloatArray, del
         wound,
         *on_its_way[: whole + 1],
     ]
-    return float(np.log(np.abs(np.linalg.eigvals(np.vstack(following))).max()) / T)
+    return np.vstack(following)

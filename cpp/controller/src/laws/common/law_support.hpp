@@ -64,6 +64,26 @@ struct ModelSample {
   }
 };
 
+/// One answer per joint.
+template <int N>
+using JointMask = Eigen::Array<bool, N, 1>;
+
+/// Which joints are farther from their reference than their dead zone, rad; a joint without one, 0, is always. What
+/// integrates waits for the others: a joint that sticks is left alone where it is near enough.
+template <int N>
+JointMask<N> outside(const JointVector<N>& dead_zone, const JointVector<N>& error) noexcept {
+  return error.array().abs() > dead_zone.array() || dead_zone.array() == 0.0;
+}
+
+/// The rule of rest: outside() of a reference that rests. One that takes less than this time to cross the dead zone
+/// moves, and nothing waits for a joint that follows it.
+template <int N>
+JointMask<N> moving_or_outside(const JointVector<N>& dead_zone, const JointVector<N>& error,
+                               const JointVector<N>& reference_speed) noexcept {
+  constexpr double kRestS = 1.0;
+  return outside<N>(dead_zone, error) || reference_speed.array().abs() * kRestS > dead_zone.array();
+}
+
 /// Evaluates the design model at the angles y; stores the clamped premises and their flag in the report.
 template <int N>
 ModelSample<N> sample_model(const DesignModel& model, const JointVector<N>& y, StepReport& report) noexcept {

@@ -63,6 +63,13 @@ class LawTable : public MemberTable<Parameters> {
     });
   }
 
+  /// One number per joint, at least 0; the parameters' own stay where there is no such member.
+  void optional_non_negative_joint_values(const char* name, JointArray Parameters::*at) {
+    this->add({name, "non-negative-joint-values", true}, [at](const Field& field, int joints, Parameters& parameters) {
+      parameters.*at = read_joint_values(field, joints, [](const Field& value) { return value.non_negative(); });
+    });
+  }
+
   /// Gains on the premises of the inertia, `rows` n x `columns` n.
   void gains(const char* name, BlockPolytope Parameters::*at, int rows, int columns) {
     this->add({name, "polytope"}, [at, rows, columns](const Field& field, int joints, Parameters& parameters) {

@@ -41,7 +41,7 @@ class ObserverLaw : public ControlLaw {
     if (valid) {
       correct(measured, report, state_);
     }
-    state_.filter(filter_pole_);
+    state_.filter(filter_pole_, compensated(y, reference));
     state_.write_to(report);
     const Command<N> command = control(state_, model, reference, report);
     to_array<N>(command.torque, report.torque_commanded);
@@ -95,6 +95,10 @@ class ObserverLaw : public ControlLaw {
   virtual void begin() noexcept {}
   /// The reference of what is measured, from that of the joints: the same, unless a law knows what is between them.
   virtual ReferenceVectors<N> shape(const ReferenceVectors<N>& reference) noexcept { return reference; }
+  /// Of which joints the filtered disturbance follows the estimate: all, unless a law has a rule of rest.
+  virtual JointMask<N> compensated(const JointVector<N>& /*y*/, const ReferenceVectors<N>& /*reference*/) noexcept {
+    return JointMask<N>::Constant(true);
+  }
   /// Corrects the estimate by what was measured; the premises are in the report.
   virtual void correct(const JointVector<N>& measured, StepReport& report, ObserverState<N>& state) noexcept = 0;
   /// The torque of this sample, before limits; the premises are in the report.

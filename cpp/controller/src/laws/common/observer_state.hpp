@@ -20,8 +20,11 @@ struct ObserverState {
     return {angle, speed, zero, zero, zero, zero};
   }
 
-  /// d_f = q d_f + (1 - q) d
-  void filter(double pole) noexcept { filtered_disturbance = pole * filtered_disturbance + (1.0 - pole) * disturbance; }
+  /// d_f = q d_f + (1 - q) d of these joints; of others it stays.
+  void filter(double pole, const JointMask<N>& joints) noexcept {
+    filtered_disturbance =
+        joints.select(pole * filtered_disturbance + (1.0 - pole) * disturbance, filtered_disturbance);
+  }
 
   /// Exact zero-order hold over t of th' = w, w' = a, a' = j, d' = d_rate:
   /// th += t w + t^2/2 a + t^3/6 j;  w += t a + t^2/2 j;  d += t d_rate.

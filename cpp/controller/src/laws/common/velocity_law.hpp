@@ -8,12 +8,14 @@ namespace quasilpv {
 /// Parameters of a law that reads measured speeds.
 struct VelocityParameters : LawParameters {
   double velocity_filter_time_constant_s = 0.0;  ///< 0: no filter
+  JointArray dead_zone{};                        ///< at rest errors up to this are not integrated, rad; 0: all are
 
   bool reads_speed() const noexcept final { return true; }
 };
 
 /// One sample of a law with feedback from angles, speeds and the integral of the error, e = r - y. Without a valid
-/// measurement the last one is held and the integral is frozen; anti-windup: see integrate_error().
+/// measurement the last one is held and the integral is frozen; anti-windup: see integrate_error(); at rest: see
+/// moving_or_outside().
 template <int N>
 class VelocityLaw : public ControlLaw {
  public:
@@ -46,7 +48,10 @@ class VelocityLaw : public ControlLaw {
     to_array<N>(command.torque, report.torque_commanded);
     report.flags |= limiter_.apply(report.torque_commanded, input.commanded, report.torque_applied);
     if (valid) {
-      integrate_error<N>(reference.angle - sample.angle, command.integral_gain, report, sample_period_s_, integral_);
+      const JointVector<N> error = reference.angle - sample.angle;
+      const JointVector<N> gain =
+          moving_or_outside<N>(dead_zone_, error, reference.speed).select(command.integral_gain, 0.0);
+      integrate_error<N>(error, gain, report, sample_period_s_, integral_);
     }
     applied(sample, model, report);
     return report;
@@ -75,6 +80,7 @@ class VelocityLaw : public ControlLaw {
   VelocityLaw(const VelocityParameters& parameters, const LawSettings& settings)
       : model_(parameters.model),
         sample_period_s_(settings.sample_period_s),
+        dead_zone_(from_array<N>(parameters.dead_zone)),
         limiter_(settings.limits, settings.sample_period_s, N),
         measurement_(settings.sample_period_s, parameters.velocity_filter_time_constant_s) {}
 
@@ -102,6 +108,7 @@ class VelocityLaw : public ControlLaw {
 
   DesignModel model_;
   double sample_period_s_;
+  JointVector<N> dead_zone_;
   Limiter limiter_;
   MeasurementFilter<N> measurement_;
   ReferenceGuard<N> reference_;

@@ -7,12 +7,12 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from quasilpv.certificate.laws.kind import LawKind
-from quasilpv.documents.law import ChainLaw
+from quasilpv.documents.law import RestingLaw
 from quasilpv.documents.strict_model import FieldError, NonNegative
 from quasilpv.documents.tables import Vector, require_size
 
 
-class ComputedTorqueLaw(ChainLaw):
+class ComputedTorqueLaw(RestingLaw):
     """What both have."""
 
     PROGRAMS = ("premises", "gravity", "coriolis")

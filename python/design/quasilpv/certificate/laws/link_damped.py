@@ -11,13 +11,13 @@ from typing import Literal
 from quasilpv.certificate.laws.dob_acceleration import Feedback
 from quasilpv.certificate.laws.kind import LawKind
 from quasilpv.documents.design_inertia import DesignInertia
-from quasilpv.documents.law import ChainLaw
+from quasilpv.documents.law import RestingLaw
 from quasilpv.documents.mechanism import Tree
 from quasilpv.documents.strict_model import FieldError, Number, Positive
 from quasilpv.documents.tables import PositiveVector, Vector
 
 
-class LinkDampedLaw(ChainLaw):
+class LinkDampedLaw(RestingLaw):
     """Tracking with a disturbance observer on the links' angles; the tree is that of links and rotors.
 
     Attributes:

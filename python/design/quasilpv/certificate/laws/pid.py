@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Literal
 
 from quasilpv.certificate.laws.kind import LawKind
-from quasilpv.documents.law import ChainLaw
+from quasilpv.documents.law import RestingLaw
 from quasilpv.documents.strict_model import NonNegative
 from quasilpv.documents.tables import Vector, require_size
 
 
-class PidLaw(ChainLaw):
+class PidLaw(RestingLaw):
     """PID with feedforward (Dehak 2022, III.54): gains act on r - y, one per joint. With a tree only of gravity."""
 
     PROGRAMS = ("premises", "gravity", "coriolis_reference")

@@ -8,7 +8,7 @@ it drives, which makes the range narrow; a range from random postures.
 
 Constraints and effort are those of `quasilpv.synthesis.baselines.tuned`; torque activity is a share of each joint's
 limit, from the noise of encoders and of measured speeds. The objective counts slow disturbances too, and counts them
-more: see `SLOPE`. The gravity torque is that of the default law.
+more: see `SLOPE`. The gravity torque is that of the default law. Integrals rest by `quasilpv.synthesis.rest`.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from quasilpv.synthesis.baselines.tuned import COMPUTED_TORQUE, WITH_OBSERVER, c
 from quasilpv.synthesis.baselines.tuning_search import LARGEST, Axes, Candidate, TuningSearch
 from quasilpv.synthesis.chain_range import find_range
 from quasilpv.synthesis.plant_grid import PlantGrid
+from quasilpv.synthesis.rest import dead_zone_members
 from quasilpv.synthesis.specification import VELOCITY_NOISE_RAD_S, Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
@@ -133,6 +134,7 @@ def _joint_by_joint(
         "kind": PidLaw.tag(),
         **{name: (gain * per_joint).tolist() for name, gain in gains},
         "velocity_filter_time_constant_s": best.tuning.velocity_filter_time_constant_s,
+        **_rest(robot, specification, best),
         **design_inertia(robot, 1.0),
     }
     return _designed(controller, robot, specification, law, best)
@@ -151,9 +153,15 @@ def _computed_torque(
         **{name: [gain] * robot.tree.order for name, gain in gains},
         "velocity_filter_time_constant_s": best.tuning.velocity_filter_time_constant_s,
         "disturbance_observer_bandwidth_rad_s": observer,
+        **_rest(robot, specification, best),
         **design_inertia(robot, best.tuning.inertia_scale),
     }
     return _designed(controller, robot, specification, law, best)
+
+
+def _rest(robot: SpatialRobot, specification: Specification, best: Candidate) -> dict[str, list[float]]:
+    """The rule of rest of a law that integrates."""
+    return dead_zone_members(robot, specification) if best.tuning.unit_gains()[2] > 0.0 else {}
 
 
 def _best(

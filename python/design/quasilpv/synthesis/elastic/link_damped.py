@@ -6,6 +6,10 @@ the motors damp the gears by ``D_s = 2 zeta sqrt(K B)``, and the inverse dynamic
 
 Its loops do not decouple, and motors' and links' angles are both fed back: a grid is looked at, each loop exactly. It
 proves nothing between its points, and the artifact claims nothing. There is no integral: the observer integrates.
+
+A motor that sticks far above Coulomb's torque makes this observer hunt: when the motor breaks away, the link goes too
+far before it is noticed. How far, the worst loop of the grid tells (`slips`); where a link is as near as that and its
+reference rests, what compensates the disturbance waits, so that no motor is made to break away that would go farther.
 """
 
 from __future__ import annotations
@@ -20,11 +24,12 @@ from quasilpv.arrays import FloatArray
 from quasilpv.certificate.laws.link_damped import LinkDampedLaw
 from quasilpv.conditions.tracking.sampled_chains import feedback_gains, observer_gains
 from quasilpv.errors import InfeasibleError
-from quasilpv.loops.link_loop import LinkLaw, link_growth_rate
+from quasilpv.loops.link_loop import LinkLaw, link_growth_rate, slips
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.tree_law import design_inertia
 from quasilpv.synthesis.elastic.arms import elastic_drives, grid_arms
 from quasilpv.synthesis.elastic.classes import Reach
+from quasilpv.synthesis.rest import dead_zone_members
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
@@ -32,6 +37,9 @@ from quasilpv.systems.robots.spatial_robot import SpatialRobot
 POSTURES = 40
 DAMPING_RATIO = 0.5
 """zeta of the motor on its gear, the link held."""
+
+BREAKAWAY = 1.8
+"""Over Coulomb's torque, of motors of which nobody states the torque at which they break away."""
 
 
 @dataclass(frozen=True)
@@ -84,11 +92,20 @@ def link_damped(robot: SpatialRobot, specification: Specification, progress: Pro
         rates.append(max(found))
         if rates[-1] < 0.0:
             grid = {**reach.to_document(), "loops": len(found), "worst_growth_rate_per_s": rates[-1]}
-            return _design(robot, specification, (choice, law, stiffness), grid)
+            far = [slips(law, arm.plant, own, specification.delay_s) for arm, own in zip(arms, inertias, strict=True)]
+            rest = dead_zone_members(robot, specification, _excess_nm(robot) * np.max(far, axis=0))
+            return _design(robot, specification, (choice, law, stiffness), grid, rest)
     raise InfeasibleError(
         f"{robot.id}: no link-damped at {specification.rate_hz:g} Hz: of {len(CHOICES)} choices of gains the best "
         f"grows by {min(rates):.3g} 1/s in a posture of the grid"
     )
+
+
+def _excess_nm(robot: SpatialRobot) -> FloatArray:
+    """By how much friction falls when a motor breaks away, (n,)."""
+    coulomb = np.array([joint.friction_coulomb_nm for joint in robot.joints])
+    stated = np.array([joint.friction_breakaway_nm for joint in robot.joints])
+    return np.asarray(np.where(stated > 0.0, stated, BREAKAWAY * coulomb) - coulomb)
 
 
 def _law(robot: SpatialRobot, choice: LinkGains, stiffness: FloatArray, period_s: float) -> LinkLaw:
@@ -108,6 +125,7 @@ def _design(
     specification: Specification,
     chosen: tuple[LinkGains, LinkLaw, FloatArray],
     grid: dict[str, Any],
+    rest: dict[str, list[float]],
 ) -> TrackingDesign:
     choice, law, stiffness = chosen
     kp, kd, ki = (float(gain) for gain in law.feedback)
@@ -122,6 +140,7 @@ def _design(
         "relative_damping_nm_s": law.relative_damping.tolist(),
         "friction_viscous_nm_s": [joint.friction_viscous_nm_s for joint in robot.joints],
         "friction_coulomb_nm": [joint.friction_coulomb_nm for joint in robot.joints],
+        **rest,
         **design_inertia(robot, 1.0),
     }
     return TrackingDesign(

@@ -14,7 +14,7 @@ its points, the artifact is called gridded and claims nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import pi, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,7 @@ from quasilpv.synthesis.acceleration.tree_law import design_inertia
 from quasilpv.synthesis.chain_range import find_range
 from quasilpv.synthesis.elastic.arms import elastic_drives, grid_arms, links_of
 from quasilpv.synthesis.elastic.classes import Reach
+from quasilpv.synthesis.rest import dead_zone_rad
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.joint_drive import ElasticDrive
@@ -44,9 +45,6 @@ from quasilpv.systems.robots.spatial_robot import SpatialRobot
 POSTURES = 100
 BESIDE_A_PROOF = 20
 """Postures of the grid, and of that whose worst loop is reported beside a proof."""
-
-DEAD_ZONE_COUNTS = 3
-"""Of the encoder: what the integral leaves alone where Coulomb friction is stated, since a motor that sticks hunts."""
 
 DAMPINGS_S = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4)
 """Over stiffness: what is tried for whoever states none."""
@@ -234,7 +232,7 @@ def _design(
         "correction_source": law.source,
         "friction_viscous_nm_s": [joint.friction_viscous_nm_s for joint in robot.joints],
         "friction_coulomb_nm": [joint.friction_coulomb_nm for joint in robot.joints],
-        "dead_zone_rad": DEAD_ZONE_COUNTS * 2.0 * pi / 2.0**specification.encoder_bits if robot.rubs else 0.0,
+        "dead_zone_rad": dead_zone_rad(robot, specification),
         **design_inertia(links, 1.0),
     }
     gears = [
