@@ -18,7 +18,7 @@ from quasilpv.certificate.exact.matrices import rational
 from quasilpv.certificate.gate.elastic import WHAT, ElasticGate
 from quasilpv.certificate.gate.exclusion import Cell
 from quasilpv.certificate.gate.motor_loop import CorrectionSource, MotorLoopData, OneJoint
-from quasilpv.certificate.gate.two_mass import BITS, ElasticSet, Exclusion, TwoMassExclusion, _aliases, _Enclosed
+from quasilpv.certificate.gate.two_mass import BITS, ElasticSet, TwoMassExclusion, _aliases, _Enclosed
 from quasilpv.cli.robust import _answer
 from quasilpv.conditions.tracking.sampled_chains import observer_gains
 from quasilpv.errors import InputError
@@ -26,7 +26,6 @@ from quasilpv.figures.gate import gate_figure
 from quasilpv.loops.elastic_loop import ElasticPlant, MotorLaw, growth_rate, loop_matrix
 from quasilpv.release import checked_artifact
 from quasilpv.synthesis import DesignRequest, synthesise
-from quasilpv.synthesis.elastic import motor_pid
 from quasilpv.synthesis.elastic.motor_pid import Gains
 from reference.elastic_robots import elastic_ur5
 
@@ -324,21 +323,6 @@ def test_when_gears_or_rotors_are_others_expect_the_artifact_refused_by_name() -
         gate(changed(("law", "rotor_inertia_kg_m2"), [0.5] * 6))
     with pytest.raises(InputError, match=r"payloads\.gears: .*6"):
         gate(changed(("payloads", "gears"), payloads["gears"][:2]))
-
-
-def test_when_no_gains_are_proved_expect_a_gridded_artifact_that_claims_nothing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(motor_pid, "POSTURES", 4)
-    monkeypatch.setattr(motor_pid.TwoMassExclusion, "decide", lambda _: Exclusion(False, True, 1, 100.0))
-    artifact = checked_artifact(synthesise(DesignRequest.of(elastic_ur5(), "motor-pid")))
-    assert artifact.witness is None
-    assert artifact.verification is not None
-    assert artifact.verification["report"]["evidence"] == "gridded"
-    assert "gate" not in artifact.verification
-    for check in (verify, gate):
-        with pytest.raises(InputError, match=r"witness: .*gridded"):
-            check(artifact)
 
 
 def test_when_a_person_asks_expect_what_is_proved_in_words() -> None:

@@ -1,7 +1,7 @@
 """An independent, small checker: every claim of an artifact, rebuilt from its data and decided, with its evidence.
 
 It shares no LMI vocabulary, no conditions and no solver with the rooms that make a design, and stands below them, so
-that it cannot (the grid gate of torque-level laws, which proves nothing, uses the loops the design searches with). It
+that it cannot (the grid gates, which prove nothing, use the loops the design searches with). It
 reads artifacts through the typed documents that writers use too: these are forms, and no formula. Four floors, each on
 those before: `exact` arithmetic, the `robot`, the `gate` and the `laws`, one file each. It checks the gains as shipped.
 """
@@ -55,7 +55,6 @@ def gate(document: Given, source: str = "artifact", delay_samples: fmpq = HALF_A
     found = LAWS[own.law.kind].gate
     if found is None:
         raise _without(own, "gate", "one with this gate")
-    _require_witness(own)
     _require_lag_covered(own)
     return found(own, delay_samples)
 

@@ -18,6 +18,7 @@ from quasilpv.files import claim_folder
 if TYPE_CHECKING:
     from quasilpv.certificate import Gate
     from quasilpv.certificate.gate.elastic import ElasticGate
+    from quasilpv.certificate.gate.elastic_grid import ElasticGridGate
     from quasilpv.certificate.gate.grid import GridGate
     from quasilpv.certificate.gate.proof import RobustGate
 
@@ -38,8 +39,9 @@ def robust_command(
 ) -> int:
     """Ask whether the frozen loop is stable in every posture, with every payload, with up to half a sample of delay.
 
-    For dob-acceleration and motor-pid the answer is a proof; for torque-level laws it is a check on a grid, and says
-    so. Exit code 1 if the gate is not passed. It reads nothing but the artifact.
+    For dob-acceleration and motor-pid the answer is a proof; for torque-level laws, and for laws of elastic joints
+    that are not proved, it is a check on a grid, and says so. Exit code 1 if the gate is not passed. It reads nothing
+    but the artifact.
 
     Of a controller of a system: its exact plant over one sample from 2000 points of the region, worst ones climbed
     from; sampled, no proof. With --delay, which no proof covers, in the mean over some samples.
@@ -79,10 +81,13 @@ def robust_command(
 def _answer(found: Gate) -> tuple[list[tuple[str, str]], str]:
     """Rows and verdict of any gate."""
     from quasilpv.certificate.gate.elastic import ElasticGate
+    from quasilpv.certificate.gate.elastic_grid import ElasticGridGate
     from quasilpv.certificate.gate.proof import RobustGate
 
     if isinstance(found, ElasticGate):
         return _elastic_answer(found)
+    if isinstance(found, ElasticGridGate):
+        return _elastic_grid_answer(found)
     return (_rows(found), _verdict(found)) if isinstance(found, RobustGate) else _grid_answer(found)
 
 
@@ -110,14 +115,32 @@ def _elastic_answer(found: ElasticGate) -> tuple[list[tuple[str, str]], str]:
     return rows, f"NOT passed: {found.why_not_passed().removeprefix('robust gate: ')}"
 
 
+def _elastic_grid_answer(found: ElasticGridGate) -> tuple[list[tuple[str, str]], str]:
+    """Rows and verdict of a grid of elastic arms."""
+    from quasilpv.certificate.gate.elastic_grid import LABEL
+
+    worst = found.worst
+    rows = [
+        ("worst growth rate", f"{worst.growth_rate_per_s:.3g} 1/s"),
+        ("  at joint angles", f"{', '.join(f'{angle:.3g}' for angle in worst.angle_rad)} rad"),
+        ("  with", f"{'the largest load' if worst.loaded else 'no load'}, the {worst.gears} gears"),
+        ("  and a delay and lag of", f"{worst.delay_s * 1e3:.3g} ms, {worst.lag_s * 1e3:.3g} ms"),
+        ("loops", f"{len(found.loops)}"),
+    ]
+    if found.passed:
+        return rows, f"passed: {LABEL}: stable at every point of the grid (frozen loop), {WHILE}; not a proof"
+    return rows, f"NOT passed: {LABEL}: a loop of the grid is not stable"
+
+
 def _draw(found: Gate, out: Path, formats: Sequence[str]) -> list[Path]:
     """The figure of a gate."""
     from quasilpv.certificate.gate.elastic import ElasticGate
+    from quasilpv.certificate.gate.elastic_grid import ElasticGridGate
     from quasilpv.certificate.gate.grid import GridGate
     from quasilpv.figures.gate import gate_figure
     from quasilpv.figures.style import save
 
-    name = GROWTH_FIGURE if isinstance(found, GridGate) else MARGIN_FIGURE
+    name = GROWTH_FIGURE if isinstance(found, GridGate | ElasticGridGate) else MARGIN_FIGURE
     if isinstance(found, ElasticGate):
         name = DISTANCE_FIGURE
     return save(gate_figure(found), out / name, formats)

@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 
 from quasilpv.certificate import Gate
 from quasilpv.certificate.gate.elastic import ElasticGate
+from quasilpv.certificate.gate.elastic_grid import ElasticGridGate
 from quasilpv.certificate.gate.grid import GridGate, growth_curves
 from quasilpv.certificate.gate.proof import RobustGate, margin_curve
 from quasilpv.figures.distance import distance_figure
-from quasilpv.figures.growth import growth_figure
+from quasilpv.figures.growth import elastic_growth_figure, growth_figure
 from quasilpv.figures.margins import margin_figure
 
 BEYOND_THE_MARGIN = fmpq(3, 2)
@@ -22,6 +23,8 @@ def gate_figure(found: Gate, ax: Axes | None = None) -> Figure:
     """What a gate found: growth rates or the inertia margin over the delay; distances over the frequency."""
     if isinstance(found, ElasticGate):
         return distance_figure(found, ax)
+    if isinstance(found, ElasticGridGate):
+        return elastic_growth_figure(found, ax)
     if isinstance(found, GridGate):
         return growth_figure(found, growth_curves(found), ax)
     return margin_figure(found, margin_curve(found.loop, _longest_delay(found), lag_samples=found.lag[1]), ax)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
+from quasilpv.certificate.gate.elastic_grid import LABEL, ElasticGridGate
 from quasilpv.certificate.gate.grid import GridGate, GrowthCurve
 from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, VERMILION, legend_of_one_plot, one_plot, style
 
@@ -46,5 +48,29 @@ def growth_figure(gate: GridGate, curves: Sequence[GrowthCurve], ax: Axes | None
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.set_xlabel("factor on the true inertia of every configuration and payload")
         axes.set_ylabel("worst growth rate (1/s)")
+        legend_of_one_plot(figure, axes, 2, is_own=ax is None)
+        return figure
+
+
+def elastic_growth_figure(gate: ElasticGridGate, ax: Axes | None = None) -> Figure:
+    """Growth rates of all loops of a grid of elastic arms, the largest first, one curve per stiffness and delay.
+
+    The gate passes if all are below zero.
+
+    Args:
+        gate: what it found.
+        ax: draw into this plot.
+    """
+    with style():
+        title = f"Growth rates of frozen loops at {1.0 / gate.sample_period_s:g} Hz: {LABEL}"
+        figure, axes = one_plot(3.8, title, ax)
+        cases = dict.fromkeys((loop.gears, loop.delay_s) for loop in gate.loops)
+        for (gears, delay_s), colour in zip(cases, (GREEN, BLUE, ORANGE, VERMILION), strict=False):
+            rates = [own.growth_rate_per_s for own in gate.loops if (own.gears, own.delay_s) == (gears, delay_s)]
+            label = f"{gears} gears, delay {delay_s * 1e3:g} ms"
+            axes.plot(np.arange(1, len(rates) + 1), sorted(rates, reverse=True), color=colour, label=label)
+        axes.axhline(0.0, color=BLACK, linewidth=0.8)
+        axes.set_xlabel("loop")
+        axes.set_ylabel("growth rate (1/s)")
         legend_of_one_plot(figure, axes, 2, is_own=ax is None)
         return figure

@@ -10,13 +10,14 @@ from flint import fmpq
 
 from quasilpv.certificate.exact.claims import Claim, Evidence
 from quasilpv.certificate.gate.elastic import ElasticGate
+from quasilpv.certificate.gate.elastic_grid import ElasticGridGate
 from quasilpv.certificate.gate.grid import GridGate
 from quasilpv.certificate.gate.proof import RobustGate
 from quasilpv.certificate.reading import Shipped
 from quasilpv.documents.artifact import ArtifactDocument
 from quasilpv.documents.law import LawDocument
 
-Gate: TypeAlias = RobustGate | GridGate | ElasticGate
+Gate: TypeAlias = RobustGate | GridGate | ElasticGate | ElasticGridGate
 
 
 class GateFunction(Protocol):

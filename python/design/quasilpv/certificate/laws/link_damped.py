@@ -1,20 +1,27 @@
 """The law `link-damped`: the default law on the links of elastic joints, inverse dynamics fed forward, gears damped.
 
-It claims nothing: the loops of its joints do not decouple, and its design is looked at on a grid of postures, loads and
-stiffnesses (`quasilpv.synthesis.elastic`).
+It claims nothing: the loops of its joints do not decouple, and its gate is a grid of postures, loads and stiffnesses
+(`quasilpv.certificate.gate.elastic_grid`).
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Literal
 
+import numpy as np
+from flint import fmpq
+
+from quasilpv.certificate.gate.elastic_grid import ElasticGridGate, elastic_grid_gate
 from quasilpv.certificate.laws.dob_acceleration import Feedback
 from quasilpv.certificate.laws.kind import LawKind
+from quasilpv.certificate.reading import Shipped
 from quasilpv.documents.design_inertia import DesignInertia
 from quasilpv.documents.law import RestingLaw
 from quasilpv.documents.mechanism import Tree
 from quasilpv.documents.strict_model import FieldError, Number, Positive
 from quasilpv.documents.tables import PositiveVector, Vector
+from quasilpv.loops.link_loop import LinkLaw, link_growth_rate
 
 
 class LinkDampedLaw(RestingLaw):
@@ -59,4 +66,18 @@ class LinkDampedLaw(RestingLaw):
                 raise FieldError(f"law.{name}", f"{len(getattr(self, name))} entries", f"{joints}, one per joint")
 
 
-LAW = LawKind(LinkDampedLaw)
+def gate(shipped: Shipped[LinkDampedLaw], delay_samples: fmpq) -> ElasticGridGate:
+    """A grid, which proves nothing."""
+    law = shipped.law
+    frozen = LinkLaw(
+        sample_period_s=shipped.artifact.sample_period_s,
+        feedback=np.array([law.feedback.kp, law.feedback.kd, law.feedback.ki]),
+        observer=np.array(law.observer),
+        filter_time_constant_s=law.filter_time_constant_s,
+        inertia_scale=law.inertia_scale,
+        relative_damping=np.array(law.relative_damping_nm_s),
+    )
+    return elastic_grid_gate(shipped, delay_samples, partial(link_growth_rate, frozen))
+
+
+LAW = LawKind(LinkDampedLaw, gate=gate, covers_lag=True)

@@ -2,8 +2,8 @@
 
 An artifact with a witness claims the stability of its frozen loop, correction included, for every arm it states and
 every delay up to that of the witness: the chain certificate of the links and the exclusion of
-`quasilpv.certificate.gate.two_mass`, in ball arithmetic. One without a witness claims nothing: its design was looked at
-on a grid of postures, loads and stiffnesses (`quasilpv.synthesis.elastic`).
+`quasilpv.certificate.gate.two_mass`, in ball arithmetic. One without a witness claims nothing: its gate is a grid of
+postures, loads and stiffnesses (`quasilpv.certificate.gate.elastic_grid`).
 """
 
 from __future__ import annotations
@@ -11,12 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal
 
+import numpy as np
 from flint import fmpq
 
 from quasilpv.certificate.exact.claims import Claim, Evidence
 from quasilpv.certificate.exact.matrices import rational
 from quasilpv.certificate.exact.rationals import to_float
 from quasilpv.certificate.gate.elastic import WHAT, ElasticGate, elastic_gate
+from quasilpv.certificate.gate.elastic_grid import ElasticGridGate, elastic_grid_gate
 from quasilpv.certificate.gate.motor_loop import CorrectionSource, MotorLoopData
 from quasilpv.certificate.laws.dob_acceleration import Feedback
 from quasilpv.certificate.laws.kind import LawKind
@@ -26,6 +28,7 @@ from quasilpv.documents.law import ChainLaw
 from quasilpv.documents.mechanism import Tree
 from quasilpv.documents.strict_model import FieldError, NonNegative, Number
 from quasilpv.documents.tables import PositiveVector, Vector
+from quasilpv.loops.elastic_loop import MotorLaw, growth_rate
 
 
 class MotorPidLaw(ChainLaw):
@@ -83,7 +86,7 @@ def claims(shipped: Shipped[MotorPidLaw]) -> Iterator[Claim]:
         InputError, ValueError: the witness is not of the documented form.
     """
     longest = rational(shipped.witness(MotorPidWitness).exclusion.longest_delay_samples)
-    found = gate(shipped, longest)
+    found = elastic_gate(shipped, loop_data(shipped.law, shipped.artifact.sample_period_s), longest)
     low, high = found.links.sides
     least, most = found.links.sampled
     lowest, highest = to_float(low.bound), to_float(high.bound)
@@ -92,9 +95,25 @@ def claims(shipped: Shipped[MotorPidLaw]) -> Iterator[Claim]:
     yield Claim.enclosed(WHAT, found.passed, -1.0 if found.exclusion is None else found.exclusion.spare)
 
 
-def gate(shipped: Shipped[MotorPidLaw], delay_samples: fmpq) -> ElasticGate:
-    """The exclusion for all that `quasilpv.certificate.gate.elastic` says."""
+def gate(shipped: Shipped[MotorPidLaw], delay_samples: fmpq) -> ElasticGate | ElasticGridGate:
+    """With a witness the exclusion for all that `quasilpv.certificate.gate.elastic` says; without one a grid."""
+    if shipped.artifact.witness is None:
+        law = _frozen(shipped.law, shipped.artifact.sample_period_s)
+        return elastic_grid_gate(shipped, delay_samples, lambda plant, _, delay_s: growth_rate(law, plant, delay_s))
     return elastic_gate(shipped, loop_data(shipped.law, shipped.artifact.sample_period_s), delay_samples)
+
+
+def _frozen(law: MotorPidLaw, sample_period_s: float) -> MotorLaw:
+    """The numbers that decide the loop in doubles."""
+    return MotorLaw(
+        sample_period_s=sample_period_s,
+        feedback=np.array([law.feedback.kp, law.feedback.kd, law.feedback.ki]),
+        observer=np.array(law.observer),
+        rotors=np.array(law.rotor_inertia_kg_m2),
+        stiffness=np.array(law.stiffness_nm_rad),
+        correction_rad_s=law.correction_bandwidth_rad_s,
+        source=law.correction_source,
+    )
 
 
 def loop_data(law: MotorPidLaw, sample_period_s: float) -> MotorLoopData:

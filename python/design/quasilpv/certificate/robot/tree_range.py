@@ -84,19 +84,35 @@ class TreePair:
         """Extreme eigenvalue of ``M_n^-1 M_t`` of one side's robots at coordinates (N, n), (N,)."""
         jacobians = self._jacobians(q)
         inverse = np.linalg.inv(np.linalg.cholesky(self._inertia(jacobians, *self._numbers(self.data.design))))
-        bodies, rotors = self._numbers(self.data.nominal)
         sign = 1.0 if side == "highest" else -1.0
-        bodies = bodies * (1.0 + sign * float(to_floats(matrix([[self.data.link_tolerance]]))[0, 0]))
-        rotors = rotors * (1.0 + sign * to_floats(matrix([self.data.rotor_tolerance]))[0])
-        true = self._inertia(jacobians, bodies, rotors)
-        last = jacobians[-1]
-        loads = [to_floats(corner) for corner in self.data.corners] if side == "highest" else [np.zeros((6, 6))]
+        rotors = self.rotors * (1.0 + sign * to_floats(matrix([self.data.rotor_tolerance]))[0])
         values = []
-        for load in loads:
-            loaded = true + np.swapaxes(last, -1, -2) @ load @ last
+        for links in self._links(jacobians, side):
+            loaded = links + np.diag(rotors)
             eigenvalues = np.linalg.eigvalsh(inverse @ loaded @ np.swapaxes(inverse, -1, -2))
             values.append(eigenvalues[:, -1] if side == "highest" else eigenvalues[:, 0])
         return np.asarray(np.max(values, axis=0) if side == "highest" else np.min(values, axis=0))
+
+    def links_at(self, q: FloatArray, side: Side) -> FloatArray:
+        """M of one side's robots without their rotors, at coordinates (N, n): by corner of the load, (C, N, n, n)."""
+        return self._links(self._jacobians(q), side)
+
+    def design_inertia_at(self, q: FloatArray) -> FloatArray:
+        """M_n at coordinates (N, n), (N, n, n)."""
+        return self._inertia(self._jacobians(q), *self._numbers(self.data.design))
+
+    @property
+    def rotors(self) -> FloatArray:
+        """Of the nominal robot, (n,)."""
+        return self._numbers(self.data.nominal)[1]
+
+    def _links(self, jacobians: FloatArray, side: Side) -> FloatArray:
+        bodies, rotors = self._numbers(self.data.nominal)
+        sign = 1.0 if side == "highest" else -1.0
+        bodies = bodies * (1.0 + sign * float(to_floats(matrix([[self.data.link_tolerance]]))[0, 0]))
+        empty, last = self._inertia(jacobians, bodies, np.zeros_like(rotors)), jacobians[-1]
+        loads = [to_floats(corner) for corner in self.data.corners] if side == "highest" else [np.zeros((6, 6))]
+        return np.array([empty + np.swapaxes(last, -1, -2) @ load @ last for load in loads])
 
     @cached_property
     def sampled(self) -> tuple[Place, Place]:
