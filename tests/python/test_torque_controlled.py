@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
@@ -16,12 +17,14 @@ from quasilpv.certificate import gate, verify
 from quasilpv.certificate.gate.proof import RobustGate
 from quasilpv.cli.robust import _answer
 from quasilpv.documents.canonical import canonical_json
-from quasilpv.errors import InputError
+from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.experiments.track import track
+from quasilpv.loops.elastic_loop import ElasticPlant
 from quasilpv.release import checked_artifact
 from quasilpv.scenarios.registry import tracking_experiment
 from quasilpv.synthesis import DesignRequest, default_controller, synthesise
+from quasilpv.synthesis.elastic import torque_controlled
 from reference.elastic_robots import elastic_ur5
 
 T = 1e-3
@@ -87,6 +90,52 @@ def test_when_gears_give_inside_torque_loops_expect_a_stable_run(tmp_path: Path)
     metrics = track(setup, tmp_path).metrics
     assert metrics.rms_tool_m < 1.2e-3
     assert metrics.share_at_limit == 0.0
+
+
+def loop_of(plant: ElasticPlant) -> np.ndarray:
+    """The derivative of (q, th, w, v, u), u the torque of the motors, written out for two joints without commands."""
+    M, B, s, lag = plant.links, plant.rotors, plant.torque_gain, plant.lag_s
+
+    def rate(y: np.ndarray) -> np.ndarray:
+        q, th, w, v, u = y.reshape(5, 2)
+        spring = plant.stiffness * (th - q) + plant.damping * (v - w)
+        return np.concatenate([w, v, np.linalg.solve(M, spring), (u - spring) / B, ((1.0 - s) * spring - u) / lag])
+
+    return np.array([rate(unit) for unit in np.eye(10)]).T
+
+
+def test_when_torque_loops_lag_expect_the_exact_flow_and_without_lag_smaller_rotors() -> None:
+    M, B = np.array([[2.0, 0.3], [0.3, 1.0]]), np.array([0.4, 0.2])
+    K, D = np.array([9e3, 5e3]), np.array([1.5, 1.0])
+    lagging = ElasticPlant(M, B, K, D, 2e-3, 4.0)
+    flow, _ = lagging.held(T, np.ones(2))
+    np.testing.assert_allclose(flow, expm(T * loop_of(lagging)), rtol=0, atol=1e-11 * np.abs(flow).max())
+    at_once, pushed = ElasticPlant(M, B, K, D, 0.0, 4.0).held(T, np.ones(2))
+    smaller, pushed_there = ElasticPlant(M, B / 4.0, K, D).held(T, np.ones(2))
+    np.testing.assert_allclose(at_once, smaller, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(pushed, pushed_there, rtol=1e-12, atol=1e-12)
+
+
+def test_when_a_torque_loop_lags_by_more_than_its_damping_bears_expect_it_to_swing_with_its_gear() -> None:
+    eta, borne = 1.5e-4, 1.5e-4 * 4.0 / 3.0
+    K = np.array([1e4, 1e4])
+    for share, grows in ((0.95, False), (1.2, True)):
+        plant = ElasticPlant(1e6 * np.eye(2), np.array([0.4, 0.2]), K, eta * K, share * borne, 4.0)
+        assert (np.linalg.eigvals(loop_of(plant)).real.max() > 1.0) == grows
+
+
+def test_when_torque_loops_lag_too_much_expect_the_design_refused_with_the_lag_they_bear(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = synthesise(DesignRequest.of(ROBOT, "dob-acceleration"))
+    known = replace(found, report={"inertia_scale": found.report["inertia_scale"]})
+    monkeypatch.setattr(torque_controlled, "POSTURES", 2)
+    monkeypatch.setattr(torque_controlled, "tree_acceleration_law", lambda *_, **__: known)
+    monkeypatch.setattr(torque_controlled, "_with_least_inertia", lambda design, *_: design)
+    with pytest.raises(InfeasibleError, match=r"grows by .* lag by 1 ms \(lag\): .* from a lag of 0\.2 ms on"):
+        synthesise(DesignRequest.of(replace(ROBOT, lag_s=(0.0, 1e-3)), "dob-acceleration"))
+    borne = synthesise(DesignRequest.of(replace(ROBOT, lag_s=(0.0, 5e-5)), "dob-acceleration"))
+    assert borne.report["elastic_loops"] == 2 * 2 * 2 * 2 * 2
 
 
 def test_when_a_joint_of_the_arm_is_rigid_expect_it_refused_by_name() -> None:

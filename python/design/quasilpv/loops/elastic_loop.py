@@ -89,6 +89,8 @@ class ElasticPlant:
         links: M, (n, n).
         rotors, stiffness, damping: B, K, D, (n,).
         lag_s: time constant of the drives.
+        torque_gain: s of drives that control the torque in their joints, whose torque follows
+            ``s command + (1 - s) spring``; 1: their torque is their command.
     """
 
     links: FloatArray
@@ -96,6 +98,7 @@ class ElasticPlant:
     stiffness: FloatArray
     damping: FloatArray
     lag_s: float = 0.0
+    torque_gain: float = 1.0
 
     def wound(self, law: MotorLaw) -> FloatArray:
         """How far the gears are wound, as the law's sensors tell it, from the states, (n, order)."""
@@ -116,7 +119,7 @@ class ElasticPlant:
     def held(self, time_s: float, assumed_rotors: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Transition of (q, th, w, v) over a time, and what a held command adds, (4 n, 4 n) and (4 n, n).
 
-        Of drives that lag the commanded accelerations that have arrived are states too, (5 n, 5 n) and (5 n, n).
+        Of drives that lag the accelerations by which they drive are states too, (5 n, 5 n) and (5 n, n).
         """
         n = len(self.rotors)
         pull, drag = np.diag(self.stiffness), np.diag(self.damping)
@@ -127,10 +130,18 @@ class ElasticPlant:
         extended = np.zeros((size + n, size + n))
         extended[: 2 * n, 2 * n : 4 * n] = np.eye(2 * n)
         extended[2 * n : 4 * n, : 4 * n] = accelerations
-        extended[3 * n : 4 * n, 4 * n : 5 * n] = np.diag(assumed_rotors / self.rotors)
+        # Drives follow `wanted`, of the plant's states and the command.
+        wanted = np.zeros((n, 5 * n))
+        wanted[:, : 4 * n] = (self.torque_gain - 1.0) * from_springs[n:] / assumed_rotors[:, None]
+        wanted[:, 4 * n :] = self.torque_gain * np.eye(n)
+        driven = np.diag(assumed_rotors / self.rotors)
         if self.lag_s > 0.0:
+            extended[3 * n : 4 * n, 4 * n : 5 * n] = driven
             extended[4 * n : 5 * n, 4 * n : 5 * n] = -np.eye(n) / self.lag_s
-            extended[4 * n : 5 * n, 5 * n :] = np.eye(n) / self.lag_s
+            extended[4 * n : 5 * n, : 4 * n] = wanted[:, : 4 * n] / self.lag_s
+            extended[4 * n : 5 * n, 5 * n :] = wanted[:, 4 * n :] / self.lag_s
+        else:
+            extended[3 * n : 4 * n] += driven @ wanted
         flow = expm(extended * time_s)
         return flow[:size, :size], flow[:size, size:]
 

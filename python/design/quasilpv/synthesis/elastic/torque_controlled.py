@@ -4,8 +4,8 @@ Where the torque in a joint follows its command through the arm's lag, whatever 
 rotor what the gain of the drive's loop leaves, ``B / sigma``, and the arm is rigid for the law: the same design, the
 same claims and the same gate, on that condition. The law reads the links' angles.
 
-Gears give all the same: a grid of elastic arms with such drives, which do not lag, is looked at beside the proof. It is
-what bounds the bandwidths, so that a few are tried, the fastest first, instead of a search.
+Gears give all the same: a grid of elastic arms with such drives, at both ends of their lag, is looked at beside the
+proof. It is what bounds the bandwidths, so that a few are tried, the fastest first, instead of a search.
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ def acceleration_in_space(
 
     Raises:
         InputError: of a torque-controlled arm a joint is rigid, or has no encoder on its link.
-        InfeasibleError: no choice of bandwidths is stable on a grid of elastic arms with such drives.
+        InfeasibleError: no choice of bandwidths is stable on a grid of elastic arms with such drives, at both ends of
+            their lag.
     """
     if robot.arm_class is not ArmClass.TORQUE_CONTROLLED:
         return tree_acceleration_law(robot, specification, progress)
@@ -91,7 +92,23 @@ def acceleration_in_space(
             return replace(design, robot=robot, law={**design.law, "angle_side": "link"}, report=report)
     raise InfeasibleError(
         f"{robot.id}: no dob-acceleration at {specification.rate_hz:g} Hz: of {len(CHOICES)} designs the best grows by "
-        f"{min(rates):.3g} 1/s where gears give and torque loops have a gain of {TORQUE_LOOP_GAIN:g}"
+        f"{min(rates):.3g} 1/s where gears give and torque loops have a gain of {TORQUE_LOOP_GAIN:g}{_of_lag(robot)}"
+    )
+
+
+def _of_lag(robot: SpatialRobot) -> str:
+    """What lags cost: half a line for refusals.
+
+    A motor behind a link that is held, ``B s^2 (1 + l s) + (K + eta K s) (sigma + l s) = 0``, is stable without the
+    spring's own help, for any K, where ``l < eta sigma / (sigma - 1)`` (Routh).
+    """
+    if robot.lag_s[1] == 0.0:
+        return ""
+    damping = min(joint.drive.damping_least_s for joint in robot.joints if joint.drive is not None)
+    borne = damping * TORQUE_LOOP_GAIN / (TORQUE_LOOP_GAIN - 1.0)
+    return (
+        f" and lag by {1e3 * robot.lag_s[1]:g} ms (lag): with damping_least {damping:g} s such loops swing with their "
+        f"own gears from a lag of {1e3 * borne:.3g} ms on"
     )
 
 
@@ -134,7 +151,7 @@ def as_rigid(robot: SpatialRobot) -> SpatialRobot:
 def _growth_rates(
     robot: SpatialRobot, stiff: SpatialRobot, design: TrackingDesign, specification: Specification
 ) -> Iterator[float]:
-    """Of elastic arms whose torque loops do not lag."""
+    """Of elastic arms with such drives."""
     gains = design.law["feedback"]
     law = LinkLaw(
         sample_period_s=design.sample_period_s,
@@ -145,9 +162,9 @@ def _growth_rates(
         relative_damping=np.zeros(len(robot.joints)),
     )
     drives = elastic_drives(robot, DobAccelerationLaw.tag(), SIDES)
-    arms = list(grid_arms(replace(robot, lag_s=(0.0, 0.0)), drives, POSTURES))
+    arms = list(grid_arms(robot, drives, POSTURES))
     inertias = stiff.tree.inertia(np.array([arm.posture for arm in arms]))
     for arm, inertia in zip(arms, inertias, strict=True):
-        plant = replace(arm.plant, rotors=arm.plant.rotors / TORQUE_LOOP_GAIN)
+        plant = replace(arm.plant, torque_gain=TORQUE_LOOP_GAIN)
         for delay_s in {0.0, specification.delay_s}:
             yield link_growth_rate(law, plant, inertia, delay_s)
