@@ -98,6 +98,18 @@ TEST(Sensors, encoders_on_both_sides_have_counts_of_their_own_and_torques_are_ex
   EXPECT_EQ(measured.gears.motor_angle_rad[2], 0.0);
 }
 
+TEST(Sensors, a_torque_is_rounded_behind_its_noise_and_exact_without_either) {
+  PlantSample truth{{0.1, -0.2}, {3.0, 4.0}};
+  truth.motors = MotorSample{{}, {}, {}, {7.3, -8.0}, kAllGearSensors, {0.0, 0.5}, {0.25, 0.0}};
+  Sensors sensors({0, 0.0, 5}, 2, kPeriod);
+  GaussianNoise noise(5);
+  for (int k = 0; k < 50; ++k) {
+    const GearReading gears = sensors.measure(k, truth).gears;
+    EXPECT_EQ(gears.joint_torque_nm[0], 7.25);
+    EXPECT_EQ(gears.joint_torque_nm[1], -8.0 + 0.5 * noise());
+  }
+}
+
 TEST(Sensors, what_a_robot_does_not_have_is_not_said) {
   PlantSample truth{{0.1}, {3.0}};
   EXPECT_EQ(Sensors({20, 0.0, 0}, 1, kPeriod).measure(0, truth).gears.available, kNoGearSensor);

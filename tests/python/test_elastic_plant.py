@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from typing import Any
 
@@ -130,6 +131,44 @@ def test_when_gears_have_sensors_expect_those_and_no_others_with_the_motion_of_t
         first = "link_angle_rad" if side == "link" else "motor_angle_rad"
         np.testing.assert_array_equal(session.measure()[0], seen[first])
         session.advance(torque)
+
+
+@pytest.mark.parametrize("integrator", [IDA, RK4], ids=["ida", "rk4"])
+def test_when_torque_sensors_err_expect_drives_to_hear_them_and_others_not(integrator: dict[str, Any]) -> None:
+    """A loop of gain s follows ``s command + (1 - s) (spring + error)``: it is told ``(1 - s) / s error`` more."""
+    arm, n, gain = random_arm(2, 35), 2, 4.0
+    content = document(arm, integrator, side="both")
+    content["plant"] |= {"torque_sensor": True, "torque_loop": {"gain": gain, "lag_s": 1e-3}}
+    noisy = copy.deepcopy(content)
+    for joint in noisy["plant"]["joints"]:
+        joint |= {"torque_noise_nm": 1.5, "torque_quantum_nm": 0.25}
+    assert Scenario.from_document(noisy).to_document() == noisy
+    heard, exact = (_runtime.PlantSession(parsed(own), T) for own in (noisy, content))
+    errors = []
+    for torque in np.random.default_rng(5).normal(0.0, 10.0, (200, n)):
+        said = heard.gears["joint_torque_nm"]
+        np.testing.assert_allclose(said / 0.25, np.rint(said / 0.25), rtol=0, atol=1e-9)
+        errors.append(said - exact.gears["joint_torque_nm"])
+        np.testing.assert_allclose(heard.angle, exact.angle, rtol=0, atol=1e-7)
+        heard.advance(torque)
+        exact.advance(torque + (1.0 - gain) / gain * errors[-1])
+    assert np.std(errors) == pytest.approx(np.hypot(1.5, 0.25 / np.sqrt(12.0)), rel=0.15)
+    content["plant"]["torque_loop"] = noisy["plant"]["torque_loop"] = None
+    heard, exact = (_runtime.PlantSession(parsed(own), T) for own in (noisy, content))
+    for torque in np.random.default_rng(5).normal(0.0, 10.0, (20, n)):
+        np.testing.assert_array_equal(heard.angle, exact.angle)
+        heard.advance(torque)
+        exact.advance(torque)
+
+
+def test_when_a_torque_sensor_that_is_not_there_errs_expect_it_refused_on_both_sides() -> None:
+    content = document(random_arm(1, 3), IDA)
+    content["plant"]["joints"][0]["torque_noise_nm"] = 0.1
+    for read in (Scenario.from_document, parsed):
+        with pytest.raises(
+            InputError, match=r"joints\[0\]\.torque_noise_nm: got 0\.1, expected 0 without torque_sensor"
+        ):
+            read(content)
 
 
 @pytest.mark.parametrize("lag_s", [0.0, 2e-3])

@@ -69,6 +69,15 @@ def test_when_encoders_and_torque_sensors_are_stated_expect_the_class(
     assert "lag_s" not in lagging
 
 
+def test_when_noise_and_resolution_of_torque_sensors_are_stated_expect_them_in_the_plant(tmp_path: Path) -> None:
+    noisy = GEAR + "\ntorque_sensor = true\ntorque_noise = 0.2\ntorque_resolution = 0.05"
+    exact = GEAR + "\ntorque_sensor = true"
+    robot = robot_with(tmp_path, noisy, exact)
+    shoulder, elbow = robot.with_payload_fraction(1.0).plant_document("perturbed")["joints"]
+    assert (shoulder["torque_noise_nm"], shoulder["torque_quantum_nm"]) == (0.2, 0.05)
+    assert not {"torque_noise_nm", "torque_quantum_nm"} & set(elbow)
+
+
 def test_when_a_break_away_torque_is_stated_expect_plants_that_stick_and_nonsense_refused(tmp_path: Path) -> None:
     friction = "\nfriction_coulomb = 0.5\nfriction_breakaway = "
     for drive in (GEAR, "rigid = true"):
@@ -106,6 +115,11 @@ def test_when_joints_are_of_several_classes_expect_the_one_that_measures_least()
         (GEAR + "\ntorque_loop = true\ntorque_sensor = true", r"joints\.shoulder\.encoder_side: got motor"),
         ('rigid = true\nencoder_side = "motor"', r"joints\.shoulder\.encoder_side: got motor, expected nothing"),
         ("rigid = true\ntorque_loop = true", r"joints\.shoulder\.torque_loop: got true"),
+        (
+            GEAR + "\ntorque_noise = 0.1",
+            r"joints\.shoulder\.torque_noise: got 0\.1, expected nothing without torque_sensor",
+        ),
+        ("rigid = true\ntorque_resolution = 0.1", r"joints\.shoulder\.torque_resolution: got 0\.1"),
         (GEAR, r"joints\.elbow\.stiffness: got joints of several kinds"),
     ],
 )

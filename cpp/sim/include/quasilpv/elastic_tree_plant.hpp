@@ -19,8 +19,8 @@ struct ElasticGear {
   double rotor_inertia_kg_m2 = 0.0;  ///< B > 0, reflected to the joint
 };
 
-/// A drive that controls the torque in its joint: its motor's torque follows s (command - spring) + spring, so that the
-/// link feels a rotor of B / s. Gain 1 is none.
+/// A drive that controls the torque in its joint: its motor's torque follows s (command - sensed) + sensed, sensed the
+/// spring's torque as its sensor says it, so that the link feels a rotor of B / s. Gain 1 is none.
 struct TorqueLoop {
   double gain = 1.0;   ///< s >= 1
   double lag_s = 0.0;  ///< time constant with which the motor's torque follows, >= 0; 0: an ideal drive
@@ -33,6 +33,8 @@ struct ElasticTreeParameters {
   std::vector<ElasticGear> gears;       ///< one per joint
   std::vector<JointFriction> friction;  ///< of the motors, one per joint
   std::uint32_t sensors = kMotorAngle;  ///< GearSensor bits; encoders on one side at least
+  JointArray torque_noise_nm{};         ///< of the torque sensors, see MotorSample
+  JointArray torque_quantum_nm{};       ///< likewise
   TorqueLoop torque_loop{};             ///< the same in all joints
 };
 
@@ -42,10 +44,11 @@ struct ElasticTreeParameters {
 ///     q' - w = 0,   th' - v = 0
 ///     M(q) w' + h(q, w) - spring - external torque = 0,   spring = K (th - q) + D (v - w)
 ///     B v' + friction + spring - u = 0
-///     lag u' + u - s control - (1 - s) spring = 0         without lag an equation that gives u
+///     lag u' + u - s control - (1 - s) (spring + error) = 0       without lag an equation that gives u
 ///
-/// M and h of the links alone, as in TreeDynamics; rotors turn about their joints only. It begins with the springs
-/// carrying the weight. Source: Spong 1987, Modeling and control of elastic joint robots.
+/// `error` is that of the torque sensors, held over a sample: set_torque_error(). M and h of the links alone, as in
+/// TreeDynamics; rotors turn about their joints only. It begins with the springs carrying the weight. Source: Spong
+/// 1987, Modeling and control of elastic joint robots.
 class ElasticTreePlant final : public Plant {
  public:
   /// INIT-ONLY.

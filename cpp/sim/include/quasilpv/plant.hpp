@@ -37,6 +37,9 @@ class Plant : public ImplicitSystem {
   void set_torque(const JointArray& torque) noexcept { torque_ = torque; }
   const JointArray& torque() const noexcept { return torque_; }
 
+  /// By how much the torque sensors of the joints err from now on, N m: drives that control these torques follow them.
+  void set_torque_error(const JointArray& error) noexcept { torque_error_ = error; }
+
   void set_external_torque(ExternalTorque external) { external_ = std::move(external); }
   const ExternalTorque& external_torque() const noexcept { return external_; }
 
@@ -44,8 +47,11 @@ class Plant : public ImplicitSystem {
   /// Held control torque + external torque at t, N m. RT-SAFE (bounded, no allocation, no lock, no throw).
   JointArray joint_torque(double t) const noexcept;
 
+  const JointArray& torque_error() const noexcept { return torque_error_; }
+
  private:
   JointArray torque_{};
+  JointArray torque_error_{};
   ExternalTorque external_;
 };
 

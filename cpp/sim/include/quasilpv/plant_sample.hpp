@@ -15,6 +15,8 @@ struct MotorSample {
   JointArray acceleration{};              ///< rad/s^2, of the torque in force
   JointArray joint_torque{};              ///< N m, what the gears transmit
   std::uint32_t sensors = kNoGearSensor;  ///< GearSensor bits: encoders on the motors, on the links, torque sensors
+  JointArray torque_noise{};              ///< N m, standard deviation of what a torque sensor adds in every sample
+  JointArray torque_quantum{};            ///< N m, a torque sensor says multiples of it; 0: it is exact
 };
 
 /// The truth at plant time t, which sensors blur and the controller never sees. Entries from the number of joints on

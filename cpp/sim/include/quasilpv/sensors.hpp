@@ -29,9 +29,9 @@ struct Measurement {
   GearReading gears{};
 };
 
-/// The multiple of `quantum` nearest to `angle` (ties away from zero); `quantum` = 0 returns `angle`.
+/// The multiple of `quantum` nearest to `value` (ties away from zero); `quantum` = 0 returns `value`.
 /// RT-SAFE (bounded, no allocation, no lock, no throw).
-double quantise(double angle, double quantum) noexcept;
+double quantise(double value, double quantum) noexcept;
 
 /// Standard normal deviates that are the same on every standard library: std::normal_distribution leaves its algorithm
 /// to the implementation, so this is Box and Muller (1958) on the 53 high bits of std::mt19937_64.
@@ -48,9 +48,9 @@ class GaussianNoise {
   bool has_spare_ = false;
 };
 
-/// Encoders, torque sensors (exact) and noisy, filtered speeds of n joints: v = q v + (1 - q) (w + noise), q = exp(-T /
-/// time constant), from the first measured speed on. Every call to measure() draws new noise, so call it once per
-/// sample.
+/// Encoders, torque sensors and noisy, filtered speeds of n joints: v = q v + (1 - q) (w + noise), q = exp(-T / time
+/// constant), from the first measured speed on. A torque is rounded behind its noise. Every call to measure() draws new
+/// noise, so call it once per sample.
 class Sensors {
  public:
   /// INIT-ONLY.
@@ -61,7 +61,8 @@ class Sensors {
   double angle_quantum_rad() const noexcept { return quantum_; }
 
  private:
-  void measure_gears(const PlantSample& truth, GearReading& gears) const noexcept;
+  void measure_gears(const PlantSample& truth, GearReading& gears);
+  double sensed_torque(const MotorSample& motors, std::size_t joint);
 
   int joints_;
   double quantum_;

@@ -60,6 +60,15 @@ TorqueLoop read_torque_loop(const Field& plant) {
   return loop;
 }
 
+// How a torque sensor errs, where there is one.
+double read_of_torque_sensor(const Field& joint, const char* name, std::uint32_t sensors) {
+  const double value = joint.has(name) ? joint[name].non_negative() : 0.0;
+  if (value > 0.0 && (sensors & kJointTorque) == 0) {
+    joint[name].fail(format_number(value), "0 without torque_sensor");
+  }
+  return value;
+}
+
 ElasticTreeParameters read_elastic_tree(const Field& field) {
   field.only({"kind", "label", "gravity_m_s2", "encoder_side", "torque_sensor", "torque_loop", "joints", "tool"});
   ElasticTreeParameters parameters;
@@ -72,9 +81,11 @@ ElasticTreeParameters read_elastic_tree(const Field& field) {
     const Field joint = joints.at(k);
     joint.only({"name", "kind", "rotation", "translation_m", "axis", "mass_kg", "first_moment_kg_m", "rotational_kg_m2",
                 "rotor_inertia_kg_m2", "friction_viscous_nm_s", "friction_coulomb_nm", "coulomb_speed_rad_s",
-                "stiffness_nm_rad", "damping_nm_s", "stick_slip"});
+                "stiffness_nm_rad", "damping_nm_s", "stick_slip", "torque_noise_nm", "torque_quantum_nm"});
     parameters.gears.push_back({joint["stiffness_nm_rad"].positive(), joint["damping_nm_s"].non_negative(),
                                 joint["rotor_inertia_kg_m2"].positive()});
+    parameters.torque_noise_nm[k] = read_of_torque_sensor(joint, "torque_noise_nm", parameters.sensors);
+    parameters.torque_quantum_nm[k] = read_of_torque_sensor(joint, "torque_quantum_nm", parameters.sensors);
     parameters.friction.push_back(read_friction(joint));
     parameters.tree.joints[k].rotor_inertia_kg_m2 = 0.0;
   }
@@ -126,7 +137,7 @@ TreeVector ElasticTreePlant::spring_torque(ConstVector y) const noexcept {
 
 TreeVector ElasticTreePlant::wanted_torque(const TreeVector& spring) const noexcept {
   const double gain = parameters_.torque_loop.gain;
-  return gain * as_vector(torque(), joints()) + (1.0 - gain) * spring;
+  return gain * as_vector(torque(), joints()) + (1.0 - gain) * (spring + as_vector(torque_error(), joints()));
 }
 
 void ElasticTreePlant::residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept {
@@ -219,8 +230,13 @@ PlantSample ElasticTreePlant::sample(double t, ConstVector y) const {
   derivative(t, y, y_dot);
   PlantSample sample{joint_array(y.head(n)), joint_array(y.segment(2 * n, n)), joint_array(y_dot.segment(2 * n, n)),
                      external_torque().at(t)};
-  sample.motors = MotorSample{joint_array(y.segment(n, n)), joint_array(y.segment(3 * n, n)),
-                              joint_array(y_dot.segment(3 * n, n)), joint_array(spring_torque(y)), parameters_.sensors};
+  sample.motors = MotorSample{joint_array(y.segment(n, n)),
+                              joint_array(y.segment(3 * n, n)),
+                              joint_array(y_dot.segment(3 * n, n)),
+                              joint_array(spring_torque(y)),
+                              parameters_.sensors,
+                              parameters_.torque_noise_nm,
+                              parameters_.torque_quantum_nm};
   return sample;
 }
 

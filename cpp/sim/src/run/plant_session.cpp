@@ -48,10 +48,18 @@ void PlantSession::expect_current(std::int64_t k) const {
   }
 }
 
-// Truth and measurement at the end of an interval, under the torque that acted on it.
+// Truth and measurement at the end of an interval, under the torque that acted on it. What the torque sensors say is
+// what drives hear over the next one.
 void PlantSession::observe(double time_s) {
   truth_ = plant_->sample(time_s, state_);
   measurement_ = sensors_.measure(seq_, truth_);
+  if (measurement_.gears.has(kJointTorque)) {
+    JointArray error{};
+    for (std::size_t j = 0; j < error.size(); ++j) {
+      error[j] = measurement_.gears.joint_torque_nm[j] - truth_.motors->joint_torque[j];
+    }
+    plant_->set_torque_error(error);
+  }
 }
 
 const Measurement& PlantSession::measure(std::int64_t k) const {

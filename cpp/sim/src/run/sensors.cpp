@@ -11,8 +11,8 @@ double quantum(int bits) { return bits > 0 ? std::ldexp(kTwoPi, -bits) : 0.0; }
 
 }  // namespace
 
-double quantise(double angle, double quantum) noexcept {
-  return quantum > 0.0 ? std::round(angle / quantum) * quantum : angle;
+double quantise(double value, double quantum) noexcept {
+  return quantum > 0.0 ? std::round(value / quantum) * quantum : value;
 }
 
 double GaussianNoise::uniform() { return static_cast<double>(generator_() >> 11) * 0x1p-53; }
@@ -55,7 +55,7 @@ Measurement Sensors::measure(std::int64_t seq, const PlantSample& truth) {
   return measurement;
 }
 
-void Sensors::measure_gears(const PlantSample& truth, GearReading& gears) const noexcept {
+void Sensors::measure_gears(const PlantSample& truth, GearReading& gears) {
   if (!truth.motors) {
     return;
   }
@@ -64,8 +64,14 @@ void Sensors::measure_gears(const PlantSample& truth, GearReading& gears) const 
   for (std::size_t j = 0; j < static_cast<std::size_t>(joints_); ++j) {
     gears.motor_angle_rad[j] = gears.has(kMotorAngle) ? quantise(truth.motors->angle[j], quantum_) : 0.0;
     gears.link_angle_rad[j] = gears.has(kLinkAngle) ? quantise(truth.angle[j], link_quantum) : 0.0;
-    gears.joint_torque_nm[j] = gears.has(kJointTorque) ? truth.motors->joint_torque[j] : 0.0;
+    gears.joint_torque_nm[j] = gears.has(kJointTorque) ? sensed_torque(*truth.motors, j) : 0.0;
   }
+}
+
+double Sensors::sensed_torque(const MotorSample& motors, std::size_t joint) {
+  const double noise = motors.torque_noise[joint];
+  const double noisy = noise > 0.0 ? motors.joint_torque[joint] + noise * noise_() : motors.joint_torque[joint];
+  return quantise(noisy, motors.torque_quantum[joint]);
 }
 
 }  // namespace quasilpv

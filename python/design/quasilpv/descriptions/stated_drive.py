@@ -41,6 +41,8 @@ class DriveKeys(StrictModel):
     encoder_side: EncoderSide | None = None
     torque_sensor: bool = False
     torque_loop: bool = False
+    torque_noise: NonNegative = 0.0
+    torque_resolution: NonNegative = 0.0
 
 
 def drive_of(source: str, place: str, stated: DriveKeys, rotor_inertia_kg_m2: float) -> ElasticDrive | None:
@@ -59,7 +61,15 @@ def drive_of(source: str, place: str, stated: DriveKeys, rotor_inertia_kg_m2: fl
         raise InputError(source, f"{place}.{name}", got, expected)
     if stiffness is None or stiffness == "rigid" or stated.damping_least is None or stated.encoder_side is None:
         return None
-    return ElasticDrive(stiffness, stated.damping_least, stated.encoder_side, stated.torque_sensor, stated.torque_loop)
+    return ElasticDrive(
+        stiffness,
+        stated.damping_least,
+        stated.encoder_side,
+        stated.torque_sensor,
+        stated.torque_loop,
+        torque_noise_nm=stated.torque_noise,
+        torque_resolution_nm=stated.torque_resolution,
+    )
 
 
 def _objections(
@@ -80,6 +90,9 @@ def _beside_rigid(stated: DriveKeys) -> Iterator[tuple[str, object, str]]:
     for name in ("damping_least", "encoder_side"):
         if getattr(stated, name) is not None:
             yield name, getattr(stated, name), "nothing with a rigid joint"
+    for name in ("torque_noise", "torque_resolution"):
+        if getattr(stated, name) > 0.0:
+            yield name, getattr(stated, name), "nothing with a rigid joint, whose sensor is not simulated"
     if stated.torque_loop:
         yield "torque_loop", "true", "false with a rigid joint, whose motor torque is the joint's"
 
@@ -95,6 +108,9 @@ def _of_gear(
         yield "damping_least", "nothing", DAMPING
     if stated.encoder_side is None:
         yield "encoder_side", "nothing", SIDE
+    for name in ("torque_noise", "torque_resolution"):
+        if getattr(stated, name) > 0.0 and not stated.torque_sensor:
+            yield name, getattr(stated, name), "nothing without torque_sensor = true"
     if stated.torque_loop and not stated.torque_sensor:
         yield "torque_sensor", "false", "true with a torque loop, which closes over it"
     if stated.torque_loop and stated.encoder_side == "motor":

@@ -119,11 +119,15 @@ class ElasticJoint(RubbingJoint):
     Attributes:
         stiffness_nm_rad, damping_nm_s: of the gear.
         rotor_inertia_kg_m2: of the motor, reflected to the joint.
+        torque_noise_nm: standard deviation of what the torque sensor adds in every sample.
+        torque_quantum_nm: the sensor says multiples of this; 0: of nothing.
     """
 
     rotor_inertia_kg_m2: Positive
     stiffness_nm_rad: Positive
     damping_nm_s: NonNegative
+    torque_noise_nm: NonNegative = 0.0
+    torque_quantum_nm: NonNegative = 0.0
 
 
 class TorqueLoop(StrictModel):
@@ -157,6 +161,14 @@ class ElasticTreePlant(MechanismDocument, _Labelled):
     torque_loop: TorqueLoop | None = None
     chain: Annotated[tuple[ElasticJoint, ...], Field(min_length=1, max_length=MAX_JOINTS, alias="joints")]
     tool: ToolFrame | None = None
+
+    @model_validator(mode="after")
+    def _check_torque_sensors(self) -> Self:
+        for k, joint in enumerate(self.chain):
+            for name in ("torque_noise_nm", "torque_quantum_nm"):
+                if getattr(joint, name) > 0.0 and not self.torque_sensor:
+                    raise FieldError(f"joints[{k}].{name}", getattr(joint, name), "0 without torque_sensor")
+        return self
 
     @property
     def joints(self) -> int:

@@ -106,6 +106,9 @@ OPTIONAL: Mapping[str, object] = {
 }
 """Members a scenario file may leave out, as files written before they were there do; and what that says."""
 
+OPTIONAL_OF_JOINTS: Mapping[str, object] = {"stick_slip": None, "torque_noise_nm": 0.0, "torque_quantum_nm": 0.0}
+"""The same of each joint of a plant."""
+
 
 def sine_torques(*terms: tuple[float, float]) -> tuple[SineTorque, ...]:
     """External torques of one sine per joint, (amplitude in N m, frequency in rad/s) each."""
@@ -167,8 +170,9 @@ class Scenario(StrictModel):
             if name in holder and holder[name] == unsaid:
                 del holder[name]
         for joint in document["plant"].get("joints", ()):
-            if joint.get("stick_slip", 0) is None:
-                del joint["stick_slip"]
+            for name, unsaid in OPTIONAL_OF_JOINTS.items():
+                if name in joint and joint[name] == unsaid:
+                    del joint[name]
         return document
 
     @classmethod

@@ -39,6 +39,8 @@ class ElasticDrive:
         encoder_side: where the angle is measured.
         torque_sensor: whether the torque in the joint is measured.
         torque_loop: whether the drive controls that torque itself.
+        torque_noise_nm: standard deviation of what the sensor adds in every sample.
+        torque_resolution_nm: of the sensor; 0: not known, taken to be none.
     """
 
     stiffness_nm_rad: Interval
@@ -46,6 +48,8 @@ class ElasticDrive:
     encoder_side: EncoderSide
     torque_sensor: bool
     torque_loop: bool
+    torque_noise_nm: float = 0.0
+    torque_resolution_nm: float = 0.0
 
     @property
     def damping_s(self) -> Interval:

@@ -38,8 +38,8 @@ class SpatialJoint:
         motion_angle_rad, motion_speed_rad_s: interval and largest speed that a proof in motion holds in; None for those
             above.
         drive: a gear that gives; None for a rigid joint.
-        friction_breakaway_nm: torque up to which the joint sticks when it is simulated, at least its Coulomb friction;
-            0: it does not stick, its Coulomb friction is smoothed.
+        friction_breakaway_nm: torque up to which the joint sticks, at least its Coulomb friction; 0: nobody said, and
+            in simulations it does not stick, its Coulomb friction is smoothed.
     """
 
     name: str
@@ -248,6 +248,8 @@ class SpatialRobot:
             damping_nm_s=damping,
             encoder_side=drives[0].encoder_side,
             torque_sensor=all(drive.torque_sensor for drive in drives),
+            torque_noise_nm=tuple(drive.torque_noise_nm for drive in drives),
+            torque_quantum_nm=tuple(drive.torque_resolution_nm for drive in drives),
             torque_gain=TORQUE_LOOP_GAIN if all(drive.torque_loop for drive in drives) else 1.0,
         )
 

@@ -132,6 +132,7 @@ class ElasticMechanism(TreeMechanism):
         stiffness_nm_rad, damping_nm_s: of the gears, (n,).
         encoder_side: what the encoders sit on.
         torque_sensor: whether the torque in the joints is measured.
+        torque_noise_nm, torque_quantum_nm: of its sensors, (n,) where there are some.
         torque_gain: of drives that control it, which then lag by ``lag_s``; 1: they do not.
     """
 
@@ -140,6 +141,8 @@ class ElasticMechanism(TreeMechanism):
     encoder_side: EncoderSide = "motor"
     torque_sensor: bool = False
     torque_gain: float = 1.0
+    torque_noise_nm: tuple[float, ...] = ()
+    torque_quantum_nm: tuple[float, ...] = ()
 
     def plant_document(self, label: str) -> dict[str, Any]:
         """See `TreeMechanism`."""
@@ -150,6 +153,9 @@ class ElasticMechanism(TreeMechanism):
         about: dict[str, Any] = {"kind": "elastic-tree", "encoder_side": self.encoder_side}
         if self.torque_sensor:
             about["torque_sensor"] = True
+            for joint, noise, quantum in zip(joints, self.torque_noise_nm, self.torque_quantum_nm, strict=True):
+                joint.update({"torque_noise_nm": noise} if noise > 0.0 else {})
+                joint.update({"torque_quantum_nm": quantum} if quantum > 0.0 else {})
         if self.torque_gain > 1.0 or lag_s > 0.0:
             about["torque_loop"] = {"gain": self.torque_gain, "lag_s": lag_s}
         return {**document, **about, "joints": joints}
