@@ -25,6 +25,7 @@ extensions = [
     "myst_nb",  # pages and notebooks; a test executes these, the site shows what they printed
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
+    "columns",
     "command_help",
     "header_table",
     "mathml",
@@ -73,6 +74,12 @@ def is_noise(_app: object, _what: str, _name: str, member: object, _skip: bool, 
     return True if str(getattr(member, "__doc__", "")).startswith("Alias for field number") else None
 
 
+def keep_colon(_app: object, what: str, _name: str, _member: object, _options: object, lines: list[str]) -> None:
+    """Napoleon takes what stands before a colon in the first line of a property for its type; of a second line not."""
+    if what == "property" and ": " in lines[0]:
+        lines.insert(0, "")
+
+
 def setup(app: Sphinx) -> None:
     """Connect the above."""
     folder = TemporaryDirectory(prefix="quasilpv-doxygen-")
@@ -80,6 +87,7 @@ def setup(app: Sphinx) -> None:
     app.config.html_extra_path = [folder.name]  # type: ignore[attr-defined]
     app.connect("build-finished", lambda _app, _error: folder.cleanup())
     app.connect("autodoc-skip-member", is_noise)
+    app.connect("autodoc-process-docstring", keep_colon, priority=400)  # before napoleon
 
 
 # Two rooms have a class Robot: the robot itself, and the member of an artifact that names it.

@@ -42,7 +42,7 @@ class CommandHelp(Directive):
 
 
 def _listing(text: str) -> nodes.literal_block:
-    return nodes.literal_block(text, text, language="text")
+    return nodes.literal_block(text, text, language="text", classes=["help"])
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from math import isnan
 from pathlib import Path
 
 from markdown_it import MarkdownIt
@@ -71,7 +72,8 @@ def commands(page: Path) -> Iterator[Command]:
     """Of the console blocks, in their order; a block of text is what the block before it prints."""
     for fence, after in pairwise([*fences(page), Fence("", "", 0)]):
         if fence.language == "console":
-            bare = [shlex.join(shlex.split(raw, comments=True)) for raw in fence.text.splitlines()]
+            whole = fence.text.replace("\\\n", " ")
+            bare = [shlex.join(shlex.split(raw, comments=True)) for raw in whole.splitlines()]
             *before, last = [line for line in bare if line]
             yield from map(Command, before)
             yield Command(last, after.text if after.language == "text" else None)
@@ -81,6 +83,7 @@ def unprinted(said: str, printed: str) -> list[str]:
     """Lines of a page that a command did not print, in their order: it may print more lines between them.
 
     Words have to be the same, and numbers within 1 %: last digits are the machine's, its libraries' and solvers'.
+    A page writes `...` for a number that is another one every time.
     """
     rest, missing = iter(printed.splitlines()), []
     for line in said.splitlines():
@@ -90,15 +93,16 @@ def unprinted(said: str, printed: str) -> list[str]:
     return missing
 
 
-NUMBER = re.compile(r"(?<![A-Za-z_])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+NUMBER = re.compile(r"(?<![A-Za-z_])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|(?<= )\.\.\.(?= )")
 
 
 def _same(said: str, printed: str) -> bool:
     (here, numbers), (there, others) = _parted(said), _parted(printed)
-    return here == there and all(abs(a - b) <= 0.01 * abs(a) for a, b in zip(numbers, others, strict=True))
+    pairs = zip(numbers, others, strict=False)
+    return here == there and all(abs(a - b) <= 0.01 * abs(a) or isnan(a) for a, b in pairs)
 
 
 def _parted(line: str) -> tuple[str, list[float]]:
     """Words of a line with a mark for each number, and the numbers."""
-    numbers = [float(found.replace("−", "-")) for found in NUMBER.findall(line)]
+    numbers = [float(found.replace("−", "-").replace("...", "nan")) for found in NUMBER.findall(line)]
     return " ".join(NUMBER.sub("#", line).split()), numbers

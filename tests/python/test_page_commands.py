@@ -104,6 +104,7 @@ def test_when_a_page_says_something_else_than_is_printed_expect_the_line() -> No
     printed = "controller      rms\npd             93.6\nctc-dob       -1e-3\n"
     assert unprinted("controller  rms\nctc-dob  -1.004e-3\n", printed) == []
     assert unprinted("ctc-dob  -1.02e-3\n", printed) == ["ctc-dob  -1.02e-3"]
+    assert unprinted("in ... s\n", "in 0.1 s") == []
     assert unprinted("pid  93.6\n", printed) == ["pid  93.6"]
     assert unprinted("ctc-dob  -1e-3\npd  93.6\n", printed) == ["pd  93.6"]  # another order
 

@@ -160,7 +160,8 @@ class GateResult:
 
     def _repr_html_(self) -> str:
         """The verdict as a table, for notebooks."""
-        rows = {"passed": self.passed, "rests on": self.evidence.value, "delay margin, s": self.delay_margin_s}
+        margin = "none" if self.delay_margin_s is None else f"{self.delay_margin_s:.4g}"
+        rows = {"passed": self.passed, "rests on": self.evidence.value, "delay margin, s": margin}
         return html_table(f"gate of {self.name}", rows)
 
     def __repr__(self) -> str:

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 
 
 def html_table(caption: str, rows: Mapping[str, object]) -> str:
-    """Two columns under a caption; text is text, whatever characters it has."""
+    """Two columns under a caption; text is text, whatever characters it has, and numbers have six digits."""
     cells = "".join(
-        f"<tr><th style='text-align:left'>{html.escape(name)}</th>"
-        f"<td style='text-align:left'>{html.escape(str(value))}</td></tr>"
+        f"<tr><th style='text-align:left;padding-right:1em'>{html.escape(name)}</th>"
+        f"<td style='text-align:left'>{html.escape(f'{value:.6g}' if isinstance(value, float) else str(value))}</td>"
+        "</tr>"
         for name, value in rows.items()
     )
     return f"<table><caption>{html.escape(caption)}</caption>{cells}</table>"
