@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,11 @@ import pytest
 
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
+from quasilpv.certificate import gate, verify
+from quasilpv.certificate.gate import elastic_grid
+from quasilpv.certificate.gate.elastic_grid import ElasticGridGate
 from quasilpv.documents.canonical import canonical_json
-from quasilpv.errors import InputError
+from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.experiments.track import track
 from quasilpv.loops.elastic_loop import ElasticPlant
@@ -21,6 +25,8 @@ from quasilpv.loops.link_loop import LinkLaw, link_growth_rate, link_matrix, sli
 from quasilpv.release import checked_artifact
 from quasilpv.scenarios.registry import tracking_experiment
 from quasilpv.synthesis import DesignRequest, default_controller, synthesise
+from quasilpv.synthesis.elastic import link_damped
+from quasilpv.systems.robots.joint_drive import ElasticDrive
 from reference.elastic_robots import elastic_ur5
 from reference.random_trees import random_tree
 from reference.tree_artifacts import tree_artifact
@@ -179,6 +185,49 @@ def test_when_encoders_sit_on_both_sides_expect_a_gridded_design_that_is_asked_f
         tracking_experiment("ur5-circle").by(robot), artifact, plant="perturbed", transport_delay_s=T / 2, log=False
     )
     assert track(setup, tmp_path).metrics.rms_tool_m < 80e-6
+
+
+def test_when_encoders_sit_on_the_links_alone_expect_a_slow_gridded_design_and_a_millimetre_whatever_the_gears(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(link_damped, "POSTURES", 8)
+    monkeypatch.setattr(elastic_grid, "POSTURES", 3)
+    robot = elastic_ur5(side="link", uncertainty=2.0)
+    artifact = checked_artifact(synthesise(DesignRequest.of(robot, default_controller(robot))))
+    assert artifact.law.kind == "link-damped"
+    assert set(artifact.law.relative_damping_nm_s) == {0.0}
+    assert artifact.verification is not None
+    assert artifact.verification["report"]["evidence"] == "gridded"
+    with pytest.raises(InputError, match=r"law\.kind: got link-damped"):
+        verify(artifact)
+    found = gate(artifact)
+    assert isinstance(found, ElasticGridGate)
+    assert found.passed
+    rms = []
+    for factor in (0.5, 2.0):
+        true = [replace(own, drive=scaled(own.drive, factor)) for own in elastic_ur5(side="link").joints]
+        arm = replace(robot, joints=tuple(true))
+        setup = RunSetup(
+            tracking_experiment("ur5-circle").by(arm), artifact, plant="perturbed", transport_delay_s=T / 2, log=False
+        )
+        rms.append(track(setup, tmp_path / str(factor)).metrics.rms_tool_m)
+    assert max(rms) < 1e-3
+    assert max(rms) / min(rms) < 1.1
+
+
+def scaled(drive: ElasticDrive | None, factor: float) -> ElasticDrive:
+    assert drive is not None
+    pull = drive.stiffness_nm_rad[0] * factor
+    return replace(drive, stiffness_nm_rad=(pull, pull))
+
+
+def test_when_a_law_of_links_is_as_fast_as_the_gears_without_motor_encoders_expect_it_refused_with_its_growth(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(link_damped, "POSTURES", 2)
+    monkeypatch.setattr(link_damped, "ALONE", replace(link_damped.ALONE, choices=link_damped.DAMPED.choices[:1]))
+    with pytest.raises(InfeasibleError, match=r"no link-dob at 1000 Hz: of 1 choices of gains the best grows by [\d.]+ 1/s"):
+        synthesise(DesignRequest.of(elastic_ur5(side="link"), "link-dob"))
 
 
 def test_when_an_arm_is_of_another_class_expect_the_law_refused_by_name() -> None:

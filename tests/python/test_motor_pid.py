@@ -234,15 +234,16 @@ def test_when_a_law_for_rigid_joints_reads_motor_encoders_expect_it_refused_and_
 def test_when_nobody_asks_for_a_controller_expect_that_of_the_class() -> None:
     assert default_controller(elastic_ur5()) == "motor-pid"
     assert default_controller(elastic_ur5(side="both")) == "motor-pid"
+    assert default_controller(elastic_ur5(side="link")) == "link-dob"
     assert default_controller(ur5()) == "dob-acceleration"
-    with pytest.raises(InputError, match=r"an arm that is elastic, link encoders, expected one that is rigid or"):
-        default_controller(elastic_ur5(side="link"))
 
 
 def test_when_an_arm_is_of_another_class_expect_motor_pid_refused_by_name() -> None:
     with pytest.raises(InputError, match=r"motor-pid for rigid joints, expected one of .*dob-acceleration"):
         synthesise(DesignRequest.of(small_robot(), "motor-pid"))
-    with pytest.raises(InputError, match=r"motor-pid for an arm that is elastic, link encoders"):
+    with pytest.raises(
+        InputError, match=r"for an arm that is elastic, link encoders, expected one of link-dob"
+    ):
         synthesise(DesignRequest.of(elastic_ur5(side="link"), "motor-pid"))
     with pytest.raises(InputError, match=r"one for robots in the plane: "):
         synthesise(DesignRequest.of("arm3", "motor-pid"))

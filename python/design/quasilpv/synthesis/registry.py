@@ -134,6 +134,12 @@ CONTROLLERS: Mapping[str, ControllerKind] = {
         arm_classes=("elastic, dual encoders",),
         only_by_name=True,
     ),
+    "link-dob": ControllerKind(
+        "elastic joints with link encoders alone: dob-acceleration on the links, slower than the gears; positions only",
+        None,
+        in_space="elastic.link_damped.link_dob",
+        arm_classes=("elastic, link encoders",),
+    ),
     "motor-pid": ControllerKind(
         "elastic joints with motor encoders: PID of the motors, inverse dynamics and elastic reference; positions only",
         None,

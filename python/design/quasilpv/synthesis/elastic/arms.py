@@ -1,19 +1,23 @@
-"""What the designs for elastic arms share: drives, links without rotors, and the grid of arms that is looked at."""
+"""What the designs for elastic arms share: drives, links without rotors, the grid of arms, and the search on it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from quasilpv.arrays import FloatArray
-from quasilpv.errors import InputError
+from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.loops.elastic_loop import ElasticPlant
+from quasilpv.progress import Progress
 from quasilpv.synthesis.acceleration.tree_law import SEED
 from quasilpv.systems.robots.joint_drive import ElasticDrive
 from quasilpv.systems.robots.spatial_robot import SpatialRobot
 from quasilpv.systems.robots.tree import KinematicTree
+
+Choice = TypeVar("Choice")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +49,35 @@ def elastic_drives(robot: SpatialRobot, controller: str, sides: Sequence[str]) -
             raise InputError(robot.source, f"joints.{joint.name}.encoder_side", joint.drive.encoder_side, expected)
         found.append(joint.drive)
     return tuple(found)
+
+
+def first_stable(
+    about: str,
+    choices: Sequence[Choice],
+    growth_rates: Callable[[Choice], Iterable[float]],
+    progress: Progress,
+    where: str = "in a posture of the grid",
+) -> tuple[Choice, dict[str, float]]:
+    """The first choice of gains that is stable in every loop of its grid: how many loops there are, and the worst.
+
+    Args:
+        about: what is designed, for errors.
+        choices: in the order in which they are tried.
+        growth_rates: of all loops of a choice, 1/s.
+        progress: called with (choices tried, choices in all).
+        where: what the best of unstable ones grows in, for errors.
+
+    Raises:
+        InfeasibleError: none is.
+    """
+    worst = []
+    for tried, choice in enumerate(choices):
+        rates = list(growth_rates(choice))
+        progress(tried + 1, len(choices))
+        worst.append(max(rates))
+        if worst[-1] < 0.0:
+            return choice, {"loops": len(rates), "worst_growth_rate_per_s": worst[-1]}
+    raise InfeasibleError(f"{about}: of {len(choices)} choices of gains the best grows by {min(worst):.3g} 1/s {where}")
 
 
 def links_of(tree: KinematicTree) -> KinematicTree:

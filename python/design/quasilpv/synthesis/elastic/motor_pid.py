@@ -13,6 +13,7 @@ its points, the artifact is called gridded and claims nothing.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Any
@@ -33,7 +34,7 @@ from quasilpv.loops.elastic_loop import MotorLaw, growth_rate
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.tree_law import design_inertia
 from quasilpv.synthesis.chain_range import find_range
-from quasilpv.synthesis.elastic.arms import elastic_drives, grid_arms, links_of
+from quasilpv.synthesis.elastic.arms import elastic_drives, first_stable, grid_arms, links_of
 from quasilpv.synthesis.elastic.classes import Reach
 from quasilpv.synthesis.rest import dead_zone_rad
 from quasilpv.synthesis.specification import Specification
@@ -97,23 +98,21 @@ def motor_pid(robot: SpatialRobot, specification: Specification, progress: Progr
     for choice, law in laws.items() if witness is not None else ():
         found = _excluded(robot, law, witness or {}, specification)
         if found.proved:
-            grid = _grid(robot, drives, law, specification.delay_s, BESIDE_A_PROOF)
+            rates = list(_growth_rates(robot, drives, law, specification.delay_s, BESIDE_A_PROOF))
+            grid = {"loops": len(rates), "worst_growth_rate_per_s": max(rates)}
             report = {"evidence": "proved", **reach.to_document(), **grid}
             return _design(robot, specification, (choice, law), report, witness)
         given_up.append(found.given_up_rad_s)
-    rates = []
-    for tried, (choice, law) in enumerate(laws.items()):
-        grid = _grid(robot, drives, law, specification.delay_s, POSTURES)
-        progress(tried + 1, len(CHOICES))
-        rates.append(float(grid["worst_growth_rate_per_s"]))
-        if rates[-1] < 0.0:
-            report = {"evidence": "gridded", "not_excluded_at_rad_s": given_up, **reach.to_document(), **grid}
-            return _design(robot, specification, (choice, law), report, None)
-    raise InfeasibleError(
-        f"{robot.id}: no motor-pid at {specification.rate_hz:g} Hz: of {len(CHOICES)} choices of gains the best grows "
-        f"by {min(rates):.3g} 1/s in a posture of the grid: its elastic modes are beyond the reach of this sample "
-        "rate, or need more damping (joints.NAME.damping_least)"
+    choice, grid = first_stable(
+        f"{robot.id}: no motor-pid at {specification.rate_hz:g} Hz",
+        list(laws),
+        lambda gains: _growth_rates(robot, drives, laws[gains], specification.delay_s, POSTURES),
+        progress,
+        "in a posture of the grid: its elastic modes are beyond the reach of this sample rate, or need more damping "
+        "(joints.NAME.damping_least)",
     )
+    report = {"evidence": "gridded", "not_excluded_at_rad_s": given_up, **reach.to_document(), **grid}
+    return _design(robot, specification, (choice, laws[choice]), report, None)
 
 
 def _laws(robot: SpatialRobot, drives: tuple[ElasticDrive, ...], period_s: float) -> dict[Gains, MotorLaw]:
@@ -140,13 +139,13 @@ def _least_damping(robot: SpatialRobot, specification: Specification) -> float |
     return None
 
 
-def _grid(
+def _growth_rates(
     robot: SpatialRobot, drives: tuple[ElasticDrive, ...], law: MotorLaw, delay_s: float, postures: int
-) -> dict[str, float]:
-    """How many loops were looked at, and the worst of them."""
-    arms = list(grid_arms(robot, drives, postures))
-    rates = [growth_rate(law, arm.plant, delay) for arm in arms for delay in {0.0, delay_s}]
-    return {"loops": len(rates), "worst_growth_rate_per_s": max(rates)}
+) -> Iterator[float]:
+    """Of all loops of a grid."""
+    for arm in grid_arms(robot, drives, postures):
+        for delay in {0.0, delay_s}:
+            yield growth_rate(law, arm.plant, delay)
 
 
 def _links_witness(robot: SpatialRobot, specification: Specification) -> dict[str, Any] | None:

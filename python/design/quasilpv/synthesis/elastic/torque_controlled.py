@@ -17,12 +17,11 @@ import numpy as np
 
 from quasilpv.certificate.gate.proof import ON_CONDITION
 from quasilpv.certificate.laws.dob_acceleration import DobAccelerationLaw
-from quasilpv.errors import InfeasibleError
 from quasilpv.loops.link_loop import LinkLaw, link_growth_rate
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.acceleration.search import Grid
 from quasilpv.synthesis.acceleration.tree_law import design_inertia, tree_acceleration_law
-from quasilpv.synthesis.elastic.arms import elastic_drives, grid_arms
+from quasilpv.synthesis.elastic.arms import elastic_drives, first_stable, grid_arms
 from quasilpv.synthesis.specification import Specification
 from quasilpv.synthesis.tracking_design import TrackingDesign
 from quasilpv.systems.robots.joint_drive import ArmClass
@@ -72,28 +71,31 @@ def acceleration_in_space(
     if robot.arm_class is not ArmClass.TORQUE_CONTROLLED:
         return tree_acceleration_law(robot, specification, progress)
     elastic_drives(robot, DobAccelerationLaw.tag(), SIDES)
-    stiff, rates = as_rigid(robot), []
-    for tried, choice in enumerate(CHOICES):
+    stiff, designs = as_rigid(robot), {}
+
+    def growth_rates(choice: Bandwidths) -> Iterator[float]:
         made = tree_acceleration_law(stiff, specification, grid=choice.grid(specification.sample_period_s))
-        design = _with_least_inertia(made, stiff, specification)
-        found = list(_growth_rates(robot, stiff, design, specification))
-        progress(tried + 1, len(CHOICES))
-        rates.append(max(found))
-        if rates[-1] < 0.0:
-            report = {
-                "arm_class": str(robot.arm_class),
-                "evidence": "proved on condition",
-                "condition": ON_CONDITION,
-                "torque_loop_gain": TORQUE_LOOP_GAIN,
-                "elastic_loops": len(found),
-                "worst_elastic_growth_rate_per_s": rates[-1],
-                **design.report,
-            }
-            return replace(design, robot=robot, law={**design.law, "angle_side": "link"}, report=report)
-    raise InfeasibleError(
-        f"{robot.id}: no dob-acceleration at {specification.rate_hz:g} Hz: of {len(CHOICES)} designs the best grows by "
-        f"{min(rates):.3g} 1/s where gears give and torque loops have a gain of {TORQUE_LOOP_GAIN:g}{_of_lag(robot)}"
+        designs[choice] = _with_least_inertia(made, stiff, specification)
+        return _growth_rates(robot, stiff, designs[choice], specification)
+
+    choice, grid = first_stable(
+        f"{robot.id}: no dob-acceleration at {specification.rate_hz:g} Hz",
+        CHOICES,
+        growth_rates,
+        progress,
+        f"where gears give and torque loops have a gain of {TORQUE_LOOP_GAIN:g}{_of_lag(robot)}",
     )
+    design = designs[choice]
+    report = {
+        "arm_class": str(robot.arm_class),
+        "evidence": "proved on condition",
+        "condition": ON_CONDITION,
+        "torque_loop_gain": TORQUE_LOOP_GAIN,
+        "elastic_loops": grid["loops"],
+        "worst_elastic_growth_rate_per_s": grid["worst_growth_rate_per_s"],
+        **design.report,
+    }
+    return replace(design, robot=robot, law={**design.law, "angle_side": "link"}, report=report)
 
 
 def _of_lag(robot: SpatialRobot) -> str:
