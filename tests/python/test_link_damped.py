@@ -226,7 +226,7 @@ def test_when_a_law_of_links_is_as_fast_as_the_gears_without_motor_encoders_expe
 ) -> None:
     monkeypatch.setattr(link_damped, "POSTURES", 2)
     monkeypatch.setattr(link_damped, "ALONE", replace(link_damped.ALONE, choices=link_damped.DAMPED.choices[:1]))
-    with pytest.raises(InfeasibleError, match=r"no link-dob at 1000 Hz: of 1 choices of gains the best grows by [\d.]+ 1/s"):
+    with pytest.raises(InfeasibleError, match=r"no link-dob at 1000 Hz: .* the best grows by [\d.]+ 1/s"):
         synthesise(DesignRequest.of(elastic_ur5(side="link"), "link-dob"))
 
 
