@@ -241,9 +241,7 @@ def test_when_nobody_asks_for_a_controller_expect_that_of_the_class() -> None:
 def test_when_an_arm_is_of_another_class_expect_motor_pid_refused_by_name() -> None:
     with pytest.raises(InputError, match=r"motor-pid for rigid joints, expected one of .*dob-acceleration"):
         synthesise(DesignRequest.of(small_robot(), "motor-pid"))
-    with pytest.raises(
-        InputError, match=r"for an arm that is elastic, link encoders, expected one of link-dob"
-    ):
+    with pytest.raises(InputError, match=r"for an arm that is elastic, link encoders, expected one of link-dob"):
         synthesise(DesignRequest.of(elastic_ur5(side="link"), "motor-pid"))
     with pytest.raises(InputError, match=r"one for robots in the plane: "):
         synthesise(DesignRequest.of("arm3", "motor-pid"))

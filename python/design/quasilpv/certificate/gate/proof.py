@@ -39,9 +39,9 @@ from quasilpv.certificate.reading import Shipped, WitnessDocument
 from quasilpv.certificate.robot.data import inertia_data
 from quasilpv.certificate.robot.planar_chain import PlanarWitness, planar_range
 from quasilpv.certificate.robot.range import InertiaPair, NeededRange, Place, needed_range
+from quasilpv.certificate.robot.registry import is_in_space
 from quasilpv.certificate.robot.tree import TreeData
 from quasilpv.certificate.robot.tree_range import TreePair, TreeWitness, tree_range
-from quasilpv.documents.mechanism import Tree
 from quasilpv.errors import InputError
 
 ON_CONDITION = "the torque in every joint follows its command through the lag, whatever the link does"
@@ -217,7 +217,7 @@ def robust_gate(
     """
     lag = _lag(shipped, loop)
     margin = inertia_margin(loop, delay_samples, lag[1])
-    if isinstance(shipped.mechanism, Tree):
+    if is_in_space(shipped.mechanism, shipped.source):
         return _tree_gate(shipped, RobustGate(loop, delay_samples, margin, None, None, None, lag=lag), limits)
     if limits is not None:
         expected = "no member of this name: for a planar robot the proof holds for all motions"

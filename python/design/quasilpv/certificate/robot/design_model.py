@@ -29,9 +29,9 @@ from quasilpv.certificate.reading import Shipped
 from quasilpv.certificate.robot.data import PREMISES, inertia_data, inertia_table
 from quasilpv.certificate.robot.inertia import InertiaData, Pair, design_inertia, true_inertia
 from quasilpv.certificate.robot.range import cosine_range
+from quasilpv.certificate.robot.registry import is_in_space
 from quasilpv.certificate.robot.stabilised_model import premise_box_claims
 from quasilpv.certificate.robot.tree_model import check_tree_model
-from quasilpv.documents.mechanism import Tree
 
 ROUNDING = fmpq(1, 1 << 40)
 """Largest deviation of an entry, relative to the geometric mean of its diagonal entries: about 9e-13."""
@@ -44,7 +44,7 @@ def check_design_model(shipped: Shipped[Any]) -> tuple[Claim, ...]:
         InputError: the robot is not known, or a premise is not the cosine of a difference of absolute angles.
         ValueError: program and table have different premises.
     """
-    if isinstance(shipped.mechanism, Tree):
+    if is_in_space(shipped.mechanism, shipped.source):
         return check_tree_model(shipped)
     data = inertia_data(shipped)
     if data.premise_pairs:

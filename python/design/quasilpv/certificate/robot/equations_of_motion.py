@@ -119,4 +119,4 @@ EQUATIONS: Mapping[str, Callable[[Shipped[Any]], EquationsOfMotion]] = {
     "five-bar": _in_a_plane,
     "spring-disc": _disc,
 }
-"""By the kind of the robot."""
+"""By the kind of the robot, of those in `robot.registry.EXACT`."""

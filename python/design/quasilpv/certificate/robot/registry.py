@@ -1,4 +1,14 @@
-"""The kinds of robots the checker knows: one exact and one numeric evaluator each, found by the tag of the document."""
+"""Where each kind of robot is decided, found by the tag of its document; a kind that is nowhere is refused by name.
+
+| kind | exactly | in doubles |
+|---|---|---|
+| those in a plane | `EXACT`: inertia as cosines of absolute angles, gravity, friction | `NUMERIC` |
+| those of `IN_SPACE` | `robot.tree`: inequalities along a chain of bodies | `tree_range.TreePair` |
+
+A robot in space has no evaluator of the first form: its inertia is no sum of cosines of differences of absolute angles,
+which premises, programs and grids of the planar laws are made of. Its laws have a chain as design inertia, whose claims
+and gates are `tree_model` and `tree_range`.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +30,30 @@ EXACT: Mapping[str, Callable[[Any], MechanismData]] = {
     "five-bar": FiveBarData,
     "spring-disc": SpringDiscData,
 }
-"""In rational arithmetic, from the document of the kind."""
+"""Of robots in a plane, in rational arithmetic, from the document of the kind."""
 
 NUMERIC: Mapping[str, Callable[[Any], RobotDynamics]] = {
     "serial-arm": SerialArmDynamics,
     "five-bar": FiveBarDynamics,
     "spring-disc": SpringDiscDynamics,
 }
-"""In doubles."""
+"""Of the same, in doubles."""
+
+IN_SPACE = frozenset({"tree"})
+"""Kinds that are chains of bodies."""
+
+
+def is_in_space(mechanism: MechanismDocument, source: str = "artifact") -> bool:
+    """Whether a robot is decided as a chain of bodies, or by the tables here.
+
+    Raises:
+        InputError: its kind is in neither.
+    """
+    if mechanism.kind in IN_SPACE:
+        return True
+    if mechanism.kind not in EXACT:
+        raise InputError(source, "robot.parameters.kind", mechanism.kind, f"one of {', '.join((*EXACT, *IN_SPACE))}")
+    return False
 
 
 def exact_robot(mechanism: MechanismDocument, source: str = "artifact") -> MechanismData:
@@ -45,7 +71,8 @@ def numeric_robot(mechanism: MechanismDocument, source: str = "artifact") -> Rob
 
 
 def known(table: Mapping[str, T], mechanism: MechanismDocument, source: str) -> T:
-    """The entry of a robot's kind. InputError: there is none."""
+    """The entry of a robot's kind. InputError: there is none; a robot in space has none in any of these tables."""
     if mechanism.kind not in table:
-        raise InputError(source, "robot.parameters.kind", mechanism.kind, f"one of {', '.join(table)} here")
+        about = " (of robots in a plane)" if mechanism.kind in IN_SPACE else ""
+        raise InputError(source, "robot.parameters.kind", mechanism.kind, f"one of {', '.join(table)} here{about}")
     return table[mechanism.kind]
