@@ -14,7 +14,7 @@ settings.register_profile("full", deadline=None, max_examples=1000, print_blob=T
 settings.load_profile("quick")
 
 # The helpers of the tests with real processes hold fixtures and assertions.
-pytest.register_assert_rewrite("two_processes", "reference.logged_run")
+pytest.register_assert_rewrite("command", "two_processes", "reference.logged_run")
 
 # A shell starts what runs in its background deaf to Ctrl-C, and so are then the processes of the tests about it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -13,6 +13,8 @@ from typing import TypeVar
 T = TypeVar("T")
 
 MOST_NAMES = 24
+MOST_CHARACTERS = 300
+"""Of what was found and where, in a message: a line is to be read."""
 
 
 class QuasilpvError(Exception):
@@ -34,18 +36,25 @@ class InputError(QuasilpvError):
         Args:
             source: where the value came from, e.g. a file name, a class or ``"arm3"``.
             field: which value, e.g. ``"links[1].inertia_kg_m2"``.
-            got: what was found (``str`` of it is printed, on one line).
+            got: what was found (``str`` of it is printed, on one line; of a long one the beginning and its length).
             expected: what is accepted, in words.
         """
         self.source = source
         self.field = field
         self.got = " ".join(str(got).split())
         self.expected = expected
-        super().__init__(f"{source}: {field}: got {self.got}, expected {expected}")
+        super().__init__(f"{_beginning(source)}: {_beginning(field)}: got {_beginning(self.got)}, expected {expected}")
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
         """Rebuild from the four parts, so that the error survives a process boundary (parallel sweeps)."""
         return type(self), (self.source, self.field, self.got, self.expected)
+
+
+def _beginning(text: str) -> str:
+    """The text, if it is short, else its beginning and how much there is of it."""
+    if len(text) <= MOST_CHARACTERS:
+        return text
+    return f"{text[:MOST_CHARACTERS]}... ({len(text)} characters)"
 
 
 def one_of(names: Iterable[str], got: str, listed_by: str = "design list") -> str:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from textwrap import TextWrapper
 from typing import Any
 
 import typer
@@ -24,7 +25,17 @@ from quasilpv.errors import InputError, one_of
 
 
 class VerbCommand(TyperCommand):
-    """A verb, whose values are all there and all of a size that can be computed with."""
+    """A verb, whose values are all there and all of a size that can be computed with, and whose help breaks no name."""
+
+    def get_help(self, ctx: Any) -> str:
+        """Its help page, with lines that end between words: a name with hyphens stays one that can be copied."""
+        at_hyphens = TextWrapper.wordsep_re
+        TextWrapper.wordsep_re = TextWrapper.wordsep_simple_re
+        try:
+            page: str = super().get_help(ctx)
+        finally:
+            TextWrapper.wordsep_re = at_hyphens
+        return page
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the command line. InputError: a value is empty, not finite, or beyond all bounds."""
