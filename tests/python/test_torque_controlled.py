@@ -14,26 +14,42 @@ from scipy.linalg import expm
 from quasilpv import _runtime
 from quasilpv.artifact import Artifact
 from quasilpv.certificate import gate, verify
+from quasilpv.certificate.gate import elastic_grid
 from quasilpv.certificate.gate.proof import RobustGate
+from quasilpv.certificate.laws import dob_acceleration
 from quasilpv.cli.robust import _answer
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.errors import InfeasibleError, InputError
 from quasilpv.experiments.setup import RunSetup
 from quasilpv.experiments.track import track
 from quasilpv.loops.elastic_loop import ElasticPlant
+from quasilpv.loops.link_loop import LinkLaw, link_growth_rate
 from quasilpv.release import checked_artifact
 from quasilpv.scenarios.registry import tracking_experiment
 from quasilpv.synthesis import DesignRequest, default_controller, synthesise
 from quasilpv.synthesis.elastic import torque_controlled
+from quasilpv.synthesis.elastic.arms import links_of
 from reference.elastic_robots import elastic_ur5
 
 T = 1e-3
 ROBOT = elastic_ur5(side="both", uncertainty=2.0, torque_loop=True)
 
 
+@pytest.fixture(autouse=True)
+def few_postures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(elastic_grid, "POSTURES", 3)
+
+
 @cache
 def designed() -> Artifact:
     return checked_artifact(synthesise(DesignRequest.of(ROBOT, default_controller(ROBOT))))
+
+
+@cache
+def gated() -> RobustGate:
+    found = gate(designed())
+    assert isinstance(found, RobustGate)
+    return found
 
 
 def changed(path: tuple[str, ...], value: Any) -> Artifact:
@@ -54,11 +70,56 @@ def test_when_drives_control_torques_expect_the_default_law_proved_on_condition(
     assert report["evidence"] == "proved on condition"
     assert report["worst_elastic_growth_rate_per_s"] < 0.0
     assert verify(artifact).verified
-    found = gate(artifact)
-    assert isinstance(found, RobustGate)
+    found = gated()
     assert found.passed
     assert "whatever the link does" in found.to_document()["on_condition"]
-    assert _answer(found)[1].endswith("whatever the link does")
+    rows, said = _answer(found)
+    assert said.endswith("whatever the link does")
+    assert found.elastic is not None
+    assert found.elastic.passed
+    assert found.to_document()["elastic_grid"]["proved"] is False
+    assert dict(rows)["elastic arms beside it (numerical, grid)"].startswith("-")
+
+
+def test_when_an_arm_is_looked_at_beside_the_proof_expect_its_loops_with_whole_rotors_in_torque_loops() -> None:
+    found = gated()
+    assert found.elastic is not None
+    content, drives = designed().content(), [own.drive for own in ROBOT.joints if own.drive is not None]
+    gains = [content["law"]["feedback"][name] for name in ("kp", "kd", "ki")]
+    filter_s, observer = content["law"]["filter_time_constant_s"], np.array(content["law"]["observer"])
+    rotors = np.array([joint.rotor_inertia_kg_m2 for joint in ROBOT.joints])
+    stiff = torque_controlled.as_rigid(ROBOT)
+    assert designed().verification is not None
+    scale = designed().verification["report"]["inertia_scale"]
+    law = LinkLaw(T, np.array(gains), observer, filter_s, scale, np.zeros(6))
+    for loop in found.elastic.loops[::5]:
+        pull = np.array([drive.stiffness_nm_rad[int(loop.gears == "stiffest")] for drive in drives])
+        drag, at = pull * np.array([drive.damping_least_s for drive in drives]), loop.angle_rad[None]
+        trees = [links_of(tree) for tree in (ROBOT.heaviest() if loop.loaded else (ROBOT.lightest(),))]
+        rates = [
+            link_growth_rate(
+                law,
+                ElasticPlant(tree.inertia(at)[0], rotors, pull, drag, 0.0, 4.0),
+                stiff.tree.inertia(at)[0],
+                loop.delay_s,
+            )
+            for tree in trees
+        ]
+        assert min(abs(loop.growth_rate_per_s - rate) for rate in rates) < 1e-6
+
+
+def test_when_an_artifact_states_a_lag_that_its_loops_do_not_bear_expect_the_gate_not_passed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Whatever is proved on condition: that takes long with a lag, so that the proof without one stands in for it."""
+    proved = replace(gated(), elastic=None)
+    assert proved.passed
+    monkeypatch.setattr(dob_acceleration, "robust_gate", lambda *_: proved)
+    found = gate(changed(("payloads", "lag_s"), [0.0, 1e-3]))
+    assert isinstance(found, RobustGate)
+    assert not found.passed
+    assert "numerical (grid), of elastic arms" in found.why_not_passed()
+    assert _answer(found)[1].startswith("NOT passed: gears give")
 
 
 def test_when_the_gain_of_the_torque_loops_is_another_expect_the_range_refused() -> None:

@@ -186,6 +186,8 @@ def _rows(gate: RobustGate) -> list[tuple[str, str]]:
         ),
         *_condition(gate),
     ]
+    if gate.elastic is not None:
+        rows.append(("elastic arms beside it (numerical, grid)", f"{gate.elastic.worst.growth_rate_per_s:.3g} 1/s"))
     if gate.worst is not None:
         place = gate.worst.place
         angles = ", ".join(f"{angle:.3g}" for angle in place.angle_rad)
@@ -230,18 +232,24 @@ def _delay(gate: RobustGate) -> str:
 def _verdict(gate: RobustGate) -> str:
     from quasilpv.certificate.gate.proof import ON_CONDITION
 
-    if gate.motion is False:
-        return "NOT passed: that one Lyapunov function is common to all motions is claimed and not proved"
-    if gate.passed and gate.motion:
+    if not gate.passed:
+        return f"NOT passed: {_refusal(gate)}"
+    if gate.motion:
         within = "" if gate.condition is None else " within these angles and speeds"
         return f"passed: proved for every motion{within}, payload and constant delay up to the specified one, {WHILE}"
-    if gate.passed:
-        lag = f", every lag of the drives of {_lags(gate)}" if gate.lag[1] > 0 else ""
-        proved = f"every posture, payload{lag} and constant delay up to the specified one (frozen loop)"
-        on = f", on condition that {ON_CONDITION}" if gate.torque_controlled else ""
-        return f"passed: proved for {proved}, {WHILE}{on}"
+    lag = f", every lag of the drives of {_lags(gate)}" if gate.lag[1] > 0 else ""
+    proved = f"every posture, payload{lag} and constant delay up to the specified one (frozen loop)"
+    on = f", on condition that {ON_CONDITION}" if gate.torque_controlled else ""
+    return f"passed: proved for {proved}, {WHILE}{on}"
+
+
+def _refusal(gate: RobustGate) -> str:
+    if gate.motion is False:
+        return "that one Lyapunov function is common to all motions is claimed and not proved"
+    if gate.elastic is not None and not gate.elastic.passed:
+        return "gears give, and a loop of the grid of elastic arms is not stable (numerical)"
     if gate.margin is None:
-        return "NOT passed: with the specified delay the loop is not stable even with the design inertia"
+        return "with the specified delay the loop is not stable even with the design inertia"
     if gate.needed is None:
-        return "NOT passed: no range of inertia ratios could be proved over the operating domain"
-    return "NOT passed: the needed range does not lie inside the inertia margin up to the specified delay"
+        return "no range of inertia ratios could be proved over the operating domain"
+    return "the needed range does not lie inside the inertia margin up to the specified delay"

@@ -1,4 +1,4 @@
-"""The gate of laws of elastic joints that claim nothing: growth rates of frozen loops on a grid.
+"""The gate of laws of elastic joints that claim nothing, and what stands beside a proof on condition: a grid of loops.
 
 From the artifact alone: postures x (empty, loaded at two opposite corners of the load's box) x (softest, stiffest gears
 with their least damping) x rotors at both ends of their tolerance x both ends of the lag x (no delay, the specified
@@ -162,7 +162,9 @@ class ElasticGrid:
     def _arms(self) -> Iterator[tuple[ElasticPlant, FloatArray, dict[str, Any]]]:
         low, high = np.array([(joint.lower, joint.upper) for joint in self.pair.data.joints]).T
         angles = np.random.default_rng(SEED).uniform(low, high, (POSTURES, len(low)))
-        law, nominal = self.pair.design_inertia_at(angles), self.pair.rotors
+        # Of drives that control torques the data have what the links feel of the rotors.
+        gain = self.payloads.torque_gain or 1.0
+        law, nominal = self.pair.design_inertia_at(angles), gain * self.pair.rotors
         for loaded, links in self._links(angles):
             for end, name in enumerate(("softest", "stiffest")):
                 stiffness = np.array([gear.stiffness_nm_rad[end] for gear in self.gears])
@@ -170,7 +172,7 @@ class ElasticGrid:
                 for factors in self._rotor_factors():
                     for lag_s in dict.fromkeys(self.payloads.drive_lag_s):
                         for posture, own, design in zip(angles, links, law, strict=True):
-                            plant = ElasticPlant(own, factors * nominal, stiffness, damping, lag_s)
+                            plant = ElasticPlant(own, factors * nominal, stiffness, damping, lag_s, gain)
                             yield (
                                 plant,
                                 design,

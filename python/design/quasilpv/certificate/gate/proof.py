@@ -23,6 +23,7 @@ from quasilpv.certificate.exact.claims import Evidence
 from quasilpv.certificate.exact.matrices import rational
 from quasilpv.certificate.exact.rationals import float_at_most, to_float
 from quasilpv.certificate.gate.delay import DelayMargin, delay_margin
+from quasilpv.certificate.gate.elastic_grid import ElasticGridGate
 from quasilpv.certificate.gate.loop import (
     NO_LAG,
     AccelerationLoopData,
@@ -80,6 +81,8 @@ class RobustGate:
         condition: within which angles and speeds `motion` holds; None if it holds for all motions, or is not claimed.
         torque_controlled: the drives are stated to control the torque in their joints: all of it is about arms whose
             drives do, see `ON_CONDITION`.
+        elastic: numerical: what became of a grid of elastic arms with such drives, whose gears give and whose lag is
+            inside the torque loops; None without gears. An unstable loop there refutes what is proved on condition.
     """
 
     loop: AccelerationLoopData
@@ -95,6 +98,7 @@ class RobustGate:
     lag: Interval = NO_LAG
     condition: TreeMotion | None = None
     torque_controlled: bool = False
+    elastic: ElasticGridGate | None = None
 
     def __repr__(self) -> str:
         """The verdict in a line."""
@@ -106,7 +110,7 @@ class RobustGate:
 
         If the artifact claims more, one Lyapunov function for all motions, that must be proved as well.
         """
-        if self.motion is False:
+        if self.motion is False or (self.elastic is not None and not self.elastic.passed):
             return False
         if self.margin is None or self.needed is None or self.delays is None or self.delays.proved is None:
             return False
@@ -140,6 +144,8 @@ class RobustGate:
         """Half a line: what was wanted and what was found."""
         if self.motion is False:
             return "robust gate: one Lyapunov function for all motions is claimed, but not proved"
+        if self.elastic is not None and not self.elastic.passed:
+            return f"{self.elastic.why_not_passed()}, of elastic arms with such drives"
         if self.needed and self.margin:
             (a, b), (low, high) = self.needed.to_floats(), self.margin.to_floats()
             inside = f"inside the inertia margin [{low:.4g}, {'infinity' if high is None else f'{high:.4g}'}]"
@@ -167,6 +173,7 @@ class RobustGate:
             "proved_in_motion": self.motion,
             **self._condition_document(),
             **({"on_condition": ON_CONDITION} if self.torque_controlled else {}),
+            **({} if self.elastic is None else {"elastic_grid": self.elastic.to_document()}),
             "needed_range": None if self.needed is None else list(self.needed.to_floats()),
             "sampled_range": None if self.sampled_range is None else list(self.sampled_range),
             "worst_growth_rate_per_s": None if worst is None else worst.growth_rate_per_s,

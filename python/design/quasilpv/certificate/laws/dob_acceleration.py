@@ -17,14 +17,18 @@ the time unit ``1/w`` of each chain (w: the bandwidth in the witness), with ``t 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
 from typing import ClassVar, Literal, Self
 
+import numpy as np
 from flint import fmpq, fmpq_mat
 from pydantic import model_validator
 
 from quasilpv.certificate.exact.claims import Claim, Evidence
 from quasilpv.certificate.exact.matrices import identity, matrix, rational, symmetric, trace, zero
 from quasilpv.certificate.exact.vertex_tables import VertexTable
+from quasilpv.certificate.gate.elastic_grid import elastic_grid_gate
 from quasilpv.certificate.gate.loop import AccelerationLoopData
 from quasilpv.certificate.gate.proof import RobustGate, robust_gate
 from quasilpv.certificate.laws.kind import LawKind
@@ -34,6 +38,7 @@ from quasilpv.certificate.robot.design_model import check_design_model
 from quasilpv.documents.law import ChainLaw
 from quasilpv.documents.strict_model import FieldError, Number, Positive, StrictModel
 from quasilpv.documents.tables import Intervals, Matrix, PolytopeTable, Vector, require_lyapunov
+from quasilpv.loops.link_loop import LinkLaw, link_growth_rate
 
 KNOWN_SIGNALS = 5
 """Of one joint: what of the loop is known at run time."""
@@ -176,9 +181,23 @@ def loop_data(shipped: Shipped[DobAccelerationLaw]) -> AccelerationLoopData:
 
 
 def gate(shipped: Shipped[DobAccelerationLaw], delay_samples: fmpq) -> RobustGate:
-    """The proof of the scalar loop for all that `quasilpv.certificate.gate.proof` says."""
+    """The proof of the scalar loop for all that `quasilpv.certificate.gate.proof` says.
+
+    Of gears whose drives control their torques a grid of elastic arms is looked at beside it.
+    """
     law = shipped.law
-    return robust_gate(shipped, loop_data(shipped), delay_samples, law.lyapunov_bound, law.motion_limits)
+    found = robust_gate(shipped, loop_data(shipped), delay_samples, law.lyapunov_bound, law.motion_limits)
+    if law.angle_side is None or getattr(shipped.payloads, "gears", None) is None:
+        return found
+    frozen = LinkLaw(
+        sample_period_s=shipped.artifact.sample_period_s,
+        feedback=np.array([law.feedback.kp, law.feedback.kd, law.feedback.ki]),
+        observer=np.array(law.observer),
+        filter_time_constant_s=law.filter_time_constant_s,
+        inertia_scale=1.0,
+        relative_damping=np.zeros(shipped.artifact.joints),
+    )
+    return replace(found, elastic=elastic_grid_gate(shipped, delay_samples, partial(link_growth_rate, frozen)))
 
 
 def _feedback_claims(period: fmpq, gains: Feedback, witness: FeedbackWitness) -> tuple[Claim, ...]:
