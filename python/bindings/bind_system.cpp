@@ -33,6 +33,7 @@ py::dict step(SystemController& controller, const DoubleArray& state, const Doub
   result["input"] = leading(report.input.data(), artifact.inputs().size());
   result["commanded"] = leading(report.commanded.data(), artifact.inputs().size());
   result["premise"] = leading(report.premise.data(), static_cast<std::size_t>(artifact.gain().premises()));
+  result["state"] = leading(report.state.data(), artifact.states().size());
   result["level"] = report.level;
   return result;
 }
@@ -83,9 +84,11 @@ void bind_system(py::module_& module) {
 
   py::class_<SystemController>(module, "SystemController", "u = K(z) x_d, limited, one call per sample.")
       .def(py::init<SystemArtifact>(), py::arg("artifact"))
-      .def("reset", &SystemController::reset, "Forget the last input.")
+      .def(
+          "reset", [](SystemController& controller) { controller.reset(); },
+          "Forget the last input; estimates begin as the artifact states.")
       .def("step", &step, py::arg("state"), py::arg("parameter"),
-           "One step: flags, input, commanded, premise, level; signals with their trim.");
+           "One step: flags, input, commanded, premise, state as the law used it, level; signals with their trim.");
 
   py::class_<SystemScenario>(module, "SystemScenario", "What happens to a general system in one run.")
       .def_static(
@@ -95,6 +98,8 @@ void bind_system(py::module_& module) {
           },
           py::arg("data"), py::arg("source"), py::arg("artifact"), "Strict reading of JSON, for this artifact.")
       .def_readonly("name", &SystemScenario::name)
+      .def_readwrite("estimate", &SystemScenario::estimate,
+                     "Of the differential states, with which an observer begins; empty: as its artifact states.")
       .def_readonly("samples", &SystemScenario::samples);
 
   module.def(

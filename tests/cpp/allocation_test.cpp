@@ -63,6 +63,7 @@ using ::quasilpv::testing::kChainLaws;
 using ::quasilpv::testing::kLawKinds;
 using ::quasilpv::testing::kPaces;
 using ::quasilpv::testing::make_loop;
+using ::quasilpv::testing::observed_table;
 using ::quasilpv::testing::QuietRobot;
 using ::quasilpv::testing::QuietSystem;
 using ::quasilpv::testing::run_control_thread;
@@ -118,16 +119,18 @@ TEST_F(Allocation, does_not_happen_in_10000_steps_of_any_law_whatever_the_input)
 }
 
 TEST_F(Allocation, does_not_happen_in_the_steps_of_a_general_system_whatever_the_state) {
-  SystemController controller(SystemArtifact::parse(json_twin(system_table()), "test"));
-  std::uint32_t flags = 0;
-  const int count = calls_in([&] {
-    for (int k = 0; k < 10000; ++k) {
-      const double state[2] = {k % 17 == 0 ? std::numeric_limits<double>::quiet_NaN() : 1.0 + 3e-4 * k, 0.1};
-      flags |= controller.step(state, nullptr).flags;
-    }
-  });
-  EXPECT_EQ(count, 0);
-  EXPECT_EQ(flags, kSignalInvalid | kSystemPremiseOutside | kInputSaturated | kOutsideRegion);
+  for (const Json& table : {system_table(), observed_table()}) {
+    SystemController controller(SystemArtifact::parse(json_twin(table), "test"));
+    std::uint32_t flags = 0;
+    const int count = calls_in([&] {
+      for (int k = 0; k < 10000; ++k) {
+        const double state[2] = {k % 17 == 0 ? std::numeric_limits<double>::quiet_NaN() : 1.0 + 3e-4 * k, 0.1};
+        flags |= controller.step(state, nullptr).flags;
+      }
+    });
+    EXPECT_EQ(count, 0);
+    EXPECT_EQ(flags, kSignalInvalid | kSystemPremiseOutside | kInputSaturated | kOutsideRegion);
+  }
 }
 
 TEST_F(Allocation, does_not_happen_in_the_control_thread_of_a_general_system_whatever_the_plant_does) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -18,6 +19,7 @@ namespace quasilpv {
 namespace {
 
 using ::quasilpv::testing::json_twin;
+using ::quasilpv::testing::observed_table;
 using ::quasilpv::testing::refusal;
 using ::quasilpv::testing::system_table;
 using ::testing::HasSubstr;
@@ -59,6 +61,100 @@ TEST(SystemController, keeps_the_last_input_while_a_signal_is_not_a_number) {
   EXPECT_EQ(report.flags, kSignalInvalid);
   controller.reset();
   EXPECT_EQ(controller.step(bad.data(), nullptr).input[0], 0.5);
+}
+
+SystemArtifact observed_pendulum() { return SystemArtifact::parse(json_twin(observed_table()), "test"); }
+
+/// The input, limited, and h of the next sample, by hand.
+struct ByHand {
+  double x = 0.0;  // h
+  double v = 0.25;
+
+  double input(double y) const {
+    const double z = 9.0 * sinc(y);
+    return std::clamp((-10.0 - z) * y - 4.0 * v, -6.0, 6.0);
+  }
+  void predict(double xi, double u, double innovation) {
+    const double rate = 9.0 * sinc(xi) * xi + u;
+    const double speed = v;
+    x += 0.01 * speed + 0.25 * innovation;
+    v += 0.01 * rate + 2.0 * innovation;
+  }
+};
+
+TEST(SystemObserver, estimates_what_is_not_measured_and_never_reads_it) {
+  SystemController controller(observed_pendulum());
+  ByHand h;
+  h.x = 0.3;  // the first measurement
+  for (int k = 0; k < 20; ++k) {
+    const double y = 0.3 - 0.01 * k;
+    const std::array<double, 2> state = {1.0 + y, std::numeric_limits<double>::quiet_NaN()};
+    const SystemReport report = controller.step(state.data(), nullptr);
+    EXPECT_NEAR(report.input[0], 0.5 + h.input(y), 1e-12);
+    EXPECT_EQ(report.state[0], 1.0 + (state[0] - 1.0));
+    EXPECT_NEAR(report.state[1], h.v, 1e-12);
+    EXPECT_NEAR(report.level, y * y / 0.25 + h.v * h.v / 4.0, 1e-12);
+    EXPECT_EQ(report.flags & kSignalInvalid, 0u);
+    h.predict(y, report.input[0] - 0.5, y - h.x);
+  }
+}
+
+TEST(SystemObserver, predicts_without_a_measurement_under_the_input_that_acts) {
+  SystemController controller(observed_pendulum());
+  const std::array<double, 2> good = {1.2, 0.0};
+  const std::array<double, 2> bad = {std::numeric_limits<double>::quiet_NaN(), 0.0};
+  ByHand h;
+  h.x = good[0] - 1.0;
+  const double u = controller.step(good.data(), nullptr).input[0] - 0.5;
+  h.predict(h.x, u, 0.0);
+  const SystemReport missed = controller.step(bad.data(), nullptr);
+  EXPECT_EQ(missed.flags, kSignalInvalid);
+  EXPECT_EQ(missed.input[0], 0.5 + u);
+  EXPECT_NEAR(missed.state[0], 1.0 + h.x, 1e-12);
+  EXPECT_NEAR(missed.state[1], h.v, 1e-12);
+  const double brake = 0.5;  // what a loop in Fault gives instead
+  controller.applied(&brake);
+  h.predict(h.x, 0.0, 0.0);
+  EXPECT_NEAR(controller.step(bad.data(), nullptr).state[1], h.v, 1e-12);
+}
+
+TEST(SystemObserver, begins_again_as_stated_or_as_it_is_told) {
+  SystemController controller(observed_pendulum());
+  const std::array<double, 2> state = {1.2, 0.0};
+  const SystemReport first = controller.step(state.data(), nullptr);
+  controller.step(state.data(), nullptr);
+  controller.reset();
+  EXPECT_EQ(controller.step(state.data(), nullptr).state, first.state);
+  const std::array<double, 2> told = {1.1, -0.5};
+  controller.reset(told.data());
+  const SystemReport report = controller.step(state.data(), nullptr);
+  EXPECT_EQ(report.state[1], -0.5);
+  ByHand h;
+  h.x = 0.1;
+  h.v = -0.5;
+  h.predict(0.2, report.input[0] - 0.5, 0.2 - 0.1);
+  EXPECT_NEAR(controller.step(state.data(), nullptr).state[1], h.v, 1e-12);
+}
+
+TEST(SystemObserver, without_a_first_measurement_nothing_is_estimated) {
+  SystemController controller(observed_pendulum());
+  const std::array<double, 2> bad = {std::numeric_limits<double>::quiet_NaN(), 0.0};
+  EXPECT_EQ(controller.step(bad.data(), nullptr).flags, kSignalInvalid);
+  const std::array<double, 2> good = {1.2, 0.0};
+  EXPECT_EQ(controller.step(good.data(), nullptr).state[1], 0.25);
+}
+
+TEST(SystemObserver, is_refused_where_it_does_not_fit_the_system) {
+  const auto refused = [](const std::function<void(Json&)>& change) {
+    Json table = observed_table();
+    change(table);
+    return refusal([&] { SystemArtifact::parse(json_twin(table), "test"); });
+  };
+  EXPECT_THAT(refused([](Json& t) { t["observer"]["measured"] = {"v", "x"}; }), HasSubstr("observer.measured"));
+  EXPECT_THAT(refused([](Json& t) { t["observer"]["measured"] = {"w"}; }), HasSubstr("observer.measured"));
+  EXPECT_THAT(refused([](Json& t) { t["observer"]["gain"] = {{1.0, 2.0}, {0.0, 0.0}}; }), HasSubstr("observer.gain"));
+  EXPECT_THAT(refused([](Json& t) { t["observer"]["start"] = {0.0}; }), HasSubstr("observer.start"));
+  EXPECT_THAT(refused([](Json& t) { t["schema_version"] = 1; }), HasSubstr("observer"));
 }
 
 TEST(EquationPlant, has_the_residual_the_slope_and_the_rates_of_its_equations) {

@@ -277,6 +277,7 @@ class SystemController:
     def step(self, state: npt.ArrayLike, parameter: npt.ArrayLike) -> dict[str, Any]: ...
 
 class SystemScenario:
+    estimate: list[float]
     @property
     def name(self) -> str: ...
     @property

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "document/document.hpp"
 
@@ -29,6 +30,20 @@ SystemSignal parse_signal(const Field& field) {
   return signal;
 }
 
+AffineMatrix parse_affine(const Field& field, int premises, int rows, int columns) {
+  field.only({"constant", "coefficients"});
+  AffineMatrix matrix;
+  matrix.constant = parse_matrix(field["constant"], rows, columns);
+  const Field slopes = field["coefficients"];
+  if (slopes.size() != static_cast<std::size_t>(premises)) {
+    slopes.fail("an array of " + std::to_string(slopes.size()), std::to_string(premises));
+  }
+  for (std::size_t p = 0; p < slopes.size(); ++p) {
+    matrix.slopes.push_back(parse_matrix(slopes.at(p), rows, columns));
+  }
+  return matrix;
+}
+
 }  // namespace
 
 SystemArtifact SystemArtifact::load(const std::string& path) { return parse(read_file(path), path); }
@@ -42,9 +57,14 @@ SystemArtifact SystemArtifact::parse(std::string_view bytes, const std::string& 
   const Json document = parse_document(bytes, source);
   const Field root(document, source, "");
   root["schema"].expect_text(kSchema);
-  const bool has_policy = root["schema_version"].integer(1, 2) > 1;
-  root.only({"schema", "schema_version", "hash", "name", "creator", "design_hash", "sample_period_s", "signals",
-             "model", "law", "region", "plant", "witness", "sampling", "verification"});
+  const bool is_second = root["schema_version"].integer(1, 2) > 1;
+  std::vector<std::string> members = {"schema",      "schema_version",  "hash",    "name",     "creator",
+                                      "design_hash", "sample_period_s", "signals", "model",    "law",
+                                      "region",      "plant",           "witness", "sampling", "verification"};
+  if (is_second) {
+    members.emplace_back("observer");
+  }
+  root.only(members);
   SystemArtifact artifact;
   artifact.hash_ = root["hash"].text();
   artifact.hash_prefix_ = static_cast<std::int64_t>(std::stoull(artifact.hash_.substr(0, 16), nullptr, 16));
@@ -54,9 +74,9 @@ SystemArtifact SystemArtifact::parse(std::string_view bytes, const std::string& 
   const int states = static_cast<int>(artifact.states_.size());
   artifact.differential_ = static_cast<int>(root["model"]["differential"].integer(1, states));
   const Field law = root["law"];
-  law.only(has_policy ? std::vector<std::string>{"kind", "gain", "schedule", "premise_fault_s"}
+  law.only(is_second ? std::vector<std::string>{"kind", "gain", "schedule", "premise_fault_s"}
                       : std::vector<std::string>{"kind", "gain", "schedule"});
-  if (has_policy) {
+  if (is_second) {
     const Field policy = law["premise_fault_s"];
     artifact.premise_fault_s_ = policy.is_null() ? kInfinity : policy.non_negative();
   }
@@ -73,8 +93,42 @@ SystemArtifact SystemArtifact::parse(std::string_view bytes, const std::string& 
     region["lyapunov"].fail("another matrix", "a positive definite matrix");
   }
   artifact.lyapunov_inverse_ = factors.solve(Eigen::MatrixXd::Identity(artifact.differential_, artifact.differential_));
+  if (is_second && !root["observer"].is_null()) {
+    artifact.parse_observer(root["observer"], root["model"]);
+  }
   artifact.parse_plant(root["plant"]);
   return artifact;
+}
+
+void SystemArtifact::parse_observer(const Field& field, const Field& model) {
+  field.only({"measured", "gain", "lyapunov", "weight", "start"});
+  const int states = static_cast<int>(states_.size());
+  SystemObserverParameters own;
+  own.E = parse_affine(model["E"], gain_.premises(), states, states);
+  own.A = parse_affine(model["A"], gain_.premises(), states, states);
+  own.B = parse_affine(model["B"], gain_.premises(), states, static_cast<int>(inputs_.size()));
+  own.is_measured.assign(states_.size(), false);
+  const Field names = field["measured"];
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string name = names.at(i).text();
+    int k = own.measured.empty() ? 0 : own.measured.back() + 1;
+    while (k < differential_ && states_[static_cast<std::size_t>(k)].name != name) {
+      ++k;
+    }
+    if (k >= differential_) {
+      names.at(i).fail("\"" + name + "\"", "a differential state, in the order of the signals");
+    }
+    own.measured.push_back(k);
+    own.is_measured[static_cast<std::size_t>(k)] = true;
+  }
+  const int measured = static_cast<int>(own.measured.size());
+  if (measured == 0 || measured == differential_) {
+    names.fail(std::to_string(measured) + " names", "1 to " + std::to_string(differential_ - 1));
+  }
+  own.gain = parse_matrix(field["gain"], differential_, measured);
+  const std::vector<double> start = field["start"].numbers(static_cast<std::size_t>(differential_));
+  own.start = Eigen::Map<const Eigen::VectorXd>(start.data(), differential_);
+  observer_ = std::move(own);
 }
 
 void SystemArtifact::parse_signals(const Field& field) {

@@ -101,7 +101,9 @@ bool SystemLoop::reset_fault() noexcept {
     return false;
   }
   failsafe_ = next;
-  controller_.reset();
+  if (!artifact().observer()) {  // whose estimates follow what was applied, which is the better start
+    controller_.reset();
+  }
   return true;
 }
 
@@ -122,6 +124,7 @@ void SystemLoop::write_command(const SystemReport& report, std::int64_t seq, std
   command_.state = failsafe_.state;
   command_.flags = report.flags;
   command_.input = last_input_;
+  controller_.applied(last_input_.data());
 }
 
 void SystemLoop::write_telemetry(const SystemReport& report, const SignalArray& value, std::int64_t step_ns) noexcept {
@@ -129,7 +132,9 @@ void SystemLoop::write_telemetry(const SystemReport& report, const SignalArray& 
   telemetry_.state = failsafe_.state;
   telemetry_.flags = report.flags;
   telemetry_.step_ns = step_ns;
-  std::copy_n(value.begin(), artifact().states().size(), telemetry_.measured.begin());
+  for (std::size_t k = 0; k < artifact().states().size(); ++k) {
+    telemetry_.measured[k] = artifact().is_measured(k) ? value[k] : report.state[k];
+  }
   // In Fault the law runs on beside a plant that it does not move; what it would command then is nobody's input.
   telemetry_.commanded = failsafe_.state != ControllerState::kFault ? report.commanded : last_input_;
   telemetry_.applied = last_input_;

@@ -30,6 +30,8 @@ struct SystemScenario {
   double delay_s = 0.0;  ///< until an input acts, at most one sample
   SystemSensorOptions sensors;
   std::vector<DisturbanceTerm> disturbances;
+  /// Of the differential states, with which an observer begins in simulate_system(); none: as its artifact states.
+  std::vector<double> estimate;
 
   /// Reads a `quasilpv.system_scenario` (docs/reference/formats.md), whose values are named as the signals of
   /// `artifact`. INIT-ONLY. Throws InputError.

@@ -17,6 +17,8 @@ const SystemScenario& checked(const SystemArtifact& artifact, const SystemScenar
   const std::size_t states = artifact.states().size();
   require_size("start", scenario.start.size(), states);
   require_size("parameter", scenario.parameter.size(), artifact.parameters().size());
+  const std::size_t estimates = static_cast<std::size_t>(artifact.differential());
+  require_size("estimate", scenario.estimate.empty() ? estimates : scenario.estimate.size(), estimates);
   for (const auto& [field, values] : {std::pair("noise", &scenario.sensors.noise),  //
                                       std::pair("quantum", &scenario.sensors.quantum)}) {
     require_size(field, values->empty() ? states : values->size(), states);
@@ -67,13 +69,16 @@ void SystemSession::observe() {
     const SystemSignal& state = artifact_.states()[i];
     const double deviation = y_[static_cast<Eigen::Index>(i)];
     truth_[i] = deviation + state.trim;
-    const double noise = sensors_.noise.empty() ? 0.0 : sensors_.noise[i];
-    const double noisy = noise > 0.0 ? truth_[i] + noise * noise_() : truth_[i];
-    measured_[i] = quantise(noisy, sensors_.quantum.empty() ? 0.0 : sensors_.quantum[i]);
     if (!exit_ && (deviation < state.low || deviation > state.high)) {
       exit_ = DomainExit{time_s(), static_cast<int>(i)};
       samples_ = seq_ + 1;
     }
+    if (!artifact_.is_measured(i)) {
+      continue;
+    }
+    const double noise = sensors_.noise.empty() ? 0.0 : sensors_.noise[i];
+    const double noisy = noise > 0.0 ? truth_[i] + noise * noise_() : truth_[i];
+    measured_[i] = quantise(noisy, sensors_.quantum.empty() ? 0.0 : sensors_.quantum[i]);
   }
 }
 

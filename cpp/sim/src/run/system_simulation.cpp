@@ -13,7 +13,8 @@ struct Columns {
         commanded_(record.add_column("commanded", artifact.inputs().size())),
         level_(record.add_column("level")),
         flags_(record.add_column("flags")),
-        premises_(artifact.gain().premises()) {
+        premises_(artifact.gain().premises()),
+        seen_(artifact.states().size()) {
     if (premises_ > 0) {
       premise_ = record.add_column("premise", static_cast<std::size_t>(premises_));
     }
@@ -23,7 +24,10 @@ struct Columns {
   void append(const SystemSession& session, const SystemReport& report) {
     record_.append(time_, session.time_s());
     record_.append(state_, session.truth().data());
-    record_.append(measured_, session.measured().data());
+    for (std::size_t k = 0; k < seen_.size(); ++k) {
+      seen_[k] = session.artifact().is_measured(k) ? session.measured()[k] : report.state[k];
+    }
+    record_.append(measured_, seen_.data());
     record_.append(input_, report.input.data());
     record_.append(commanded_, report.commanded.data());
     record_.append(level_, report.level);
@@ -38,6 +42,7 @@ struct Columns {
   std::size_t time_, state_, measured_, input_, commanded_, level_, flags_;
   int premises_;
   std::size_t premise_ = 0;
+  std::vector<double> seen_;
 };
 
 }  // namespace
@@ -45,6 +50,9 @@ struct Columns {
 SystemRun simulate_system(const SystemArtifact& artifact, const SystemScenario& scenario) {
   SystemController controller(artifact);
   SystemSession session(artifact, scenario);
+  if (!scenario.estimate.empty()) {
+    controller.reset(scenario.estimate.data());
+  }
   SystemRun run;
   Columns columns(run.samples, artifact, scenario.samples);
   while (session.seq() < session.samples()) {

@@ -141,8 +141,41 @@ class LinearisedSampling(StrictModel):
     longest_period_s: Positive
 
 
-SAMPLING_METHODS = ("euler", "linearised")
-SamplingDocument = Annotated[EulerSampling | LinearisedSampling, Field(discriminator="method")]
+class ObserverSampling(StrictModel):
+    """The sampling period is proved together with an observer, by Euler's bound of both.
+
+    b, J, d, mu and theta of `quasilpv.certificate.systems.observed`.
+    """
+
+    method: Literal["observer"]
+    speed_per_s: NonNegative
+    lipschitz_per_s: NonNegative
+    mismatch_per_s: NonNegative
+    error_contraction: NonNegative
+    contraction: NonNegative
+
+
+SAMPLING_METHODS = ("euler", "linearised", "observer")
+SamplingDocument = Annotated[EulerSampling | LinearisedSampling | ObserverSampling, Field(discriminator="method")]
+
+
+class ObserverDocument(StrictModel):
+    """The law reads some states only; the others it estimates.
+
+    With y the measured states, h the prediction and xi = y where it is measured, h elsewhere: ``u = K(z) xi`` and
+    ``h+ = h + T E_1^-1 (A xi + B u) + L (y - C h)``, E, A and B those of the model at z = ``law.schedule`` of xi,
+    algebraic states eliminated. What is proved holds while ``|x|_P + nu |x - h|_Q <= 1``, ``|y|_P^2 = y' P^-1 y``.
+    """
+
+    measured: tuple[Name, ...]
+    gain: Matrix
+    """L, (q, measured)."""
+    lyapunov: Matrix
+    """Q, (q, q)."""
+    weight: Positive
+    """nu."""
+    start: Vector
+    """Of h, (q,), deviations; where a state is measured, its first measurement takes its place."""
 
 
 class SystemArtifactDocument(StrictModel):
@@ -158,6 +191,8 @@ class SystemArtifactDocument(StrictModel):
     model: ModelDocument
     law: RegionalFeedback
     region: RegionDocument
+    observer: ObserverDocument | None = None
+    """Since version 2; null: the law reads all differential states."""
     plant: PlantDocument
     witness: dict[str, Rows]
     sampling: SamplingDocument | None
@@ -183,6 +218,13 @@ class SystemArtifactDocument(StrictModel):
         return self.of("parameter")
 
     @property
+    def measured(self) -> tuple[bool, ...]:
+        """Of every state, whether the law is told it; of an algebraic one it is, unless there is an observer."""
+        if self.observer is None:
+            return (True,) * len(self.states)
+        return tuple(signal.name in self.observer.measured for signal in self.states)
+
+    @property
     def l2_gain(self) -> tuple[float, float] | None:
         """The gain, and the energy of a disturbance from rest (its square, integrated, s) within the region."""
         if L2_GAIN not in self.witness:
@@ -199,7 +241,7 @@ class SystemArtifactDocument(StrictModel):
         """Return the artifact as a JSON tree without its hash, in the version it was written in."""
         content: Document = self.model_dump(mode="json", by_alias=True)
         if self.schema_version == 1:
-            del content["law"]["premise_fault_s"]
+            del content["law"]["premise_fault_s"], content["observer"]
         return content
 
     def to_document(self) -> Document:
@@ -241,8 +283,31 @@ class SystemArtifactDocument(StrictModel):
         if self.law.gain.lower != self.model.lower or self.law.gain.upper != self.model.upper:
             raise FieldError("law.gain", "another box", "that of the model's premises")
         require_lyapunov("region.lyapunov", self.region.lyapunov, q)
+        self._check_observer(q)
         self._check_programs(n, m, r)
         return self
+
+    def _check_observer(self, q: int) -> None:
+        if self.schema_version == 1 and "observer" in self.model_fields_set:
+            raise FieldError("observer", "a member", "none before version 2")
+        if self.schema_version > 1 and "observer" not in self.model_fields_set:
+            raise FieldError("observer", "nothing", "an observer, or null")
+        proved_with_one = isinstance(self.sampling, ObserverSampling)
+        if self.sampling is not None and proved_with_one != (self.observer is not None):
+            expected = "observer" if self.observer is not None else "euler or linearised: there is no observer"
+            raise FieldError("sampling.method", self.sampling.method, expected)
+        if self.observer is None:
+            return
+        own, names = self.observer, [signal.name for signal in self.states[:q]]
+        if list(own.measured) != [name for name in names if name in own.measured] or not 0 < len(own.measured) < q:
+            raise FieldError("observer.measured", list(own.measured), f"some, in this order, of {', '.join(names)}")
+        read = {step[1] for step in self.model.premises.code if step[0] == "signal"}
+        algebraic = [self.signals[k].name for k in sorted(read) if q <= k < len(self.states)]
+        if algebraic:
+            raise FieldError("observer", "one", f"null: premises depend on the algebraic state {algebraic[0]}")
+        require_shape("observer.gain", own.gain, q, len(own.measured))
+        require_lyapunov("observer.lyapunov", own.lyapunov, q)
+        require_size("observer.start", own.start, q)
 
     def _check_programs(self, n: int, m: int, r: int) -> None:
         signals = len(self.signals)

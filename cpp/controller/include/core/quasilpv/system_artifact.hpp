@@ -3,12 +3,14 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "quasilpv/block_polytope.hpp"
 #include "quasilpv/program.hpp"
+#include "quasilpv/system_observer.hpp"
 
 namespace quasilpv {
 
@@ -27,7 +29,8 @@ struct SystemSignal {
   bool known = true;  ///< of a parameter: whether the law is told its value
 };
 
-/// A validated artifact of a general system: u = K(z) x_d in the region x_d' P^-1 x_d <= 1. Immutable, self-contained.
+/// A validated artifact of a general system: u = K(z) x_d in the region x_d' P^-1 x_d <= 1, with an observer where
+/// states are not measured. Immutable, self-contained.
 /// Signals are numbered: states (differential ones first), inputs, parameters; in programs of the plant the rates of
 /// the states after them.
 class SystemArtifact {
@@ -56,6 +59,11 @@ class SystemArtifact {
   double premise_fault_s() const noexcept { return premise_fault_s_; }
   const Eigen::MatrixXd& lyapunov_inverse() const noexcept { return lyapunov_inverse_; }  ///< P^-1
 
+  /// Estimates the states that are not measured; none: the law is told all of them.
+  const std::optional<SystemObserverParameters>& observer() const noexcept { return observer_; }
+  /// Whether a state is told to the law.
+  bool is_measured(std::size_t state) const noexcept { return !observer_ || observer_->is_measured[state]; }
+
   /// F(x', x, u, p) of all signals and rates.
   const Program& residual() const noexcept { return residual_; }
   /// Row i: dF_i/dx' of every state, then dF_i/dx.
@@ -63,6 +71,7 @@ class SystemArtifact {
 
  private:
   void parse_signals(const Field& field);
+  void parse_observer(const Field& field, const Field& model);
   void parse_plant(const Field& field);
 
   std::string name_;
@@ -77,6 +86,7 @@ class SystemArtifact {
   BlockPolytope gain_;
   double premise_fault_s_ = 1.0;  // of version 1
   Eigen::MatrixXd lyapunov_inverse_;
+  std::optional<SystemObserverParameters> observer_;
   Program residual_;
   std::vector<Program> jacobian_;
 };

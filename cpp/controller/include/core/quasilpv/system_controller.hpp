@@ -4,10 +4,12 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "quasilpv/step.hpp"
 #include "quasilpv/system_artifact.hpp"
+#include "quasilpv/system_observer.hpp"
 
 namespace quasilpv {
 
@@ -27,29 +29,45 @@ struct SystemReport {
   std::array<double, kMaxInputs> input{};      ///< what the plant gets
   std::array<double, kMaxInputs> commanded{};  ///< before limits
   std::array<double, kMaxPremises> premise{};  ///< after clamping
-  double level = 0.0;                          ///< V = x_d' P^-1 x_d; at most 1 inside the region
+  std::array<double, kMaxStates> state{};      ///< what the law used: measured, or estimated
+  double level = 0.0;                          ///< V = x_d' P^-1 x_d of it; at most 1 inside the region
 };
 
-/// u = K(z) x_d, limited. With deviations from the trim throughout; arguments and results are the signals themselves.
+/// u = K(z) x_d, limited, x_d measured or estimated. With deviations from the trim throughout; arguments and results
+/// are the signals themselves.
 class SystemController {
  public:
   /// INIT-ONLY.
   explicit SystemController(SystemArtifact artifact);
+  SystemController(const SystemController&) = delete;
+  SystemController& operator=(const SystemController&) = delete;
 
   const SystemArtifact& artifact() const noexcept { return artifact_; }
 
   /// One step. RT-SAFE (bounded by the programs, no allocation, no lock, no throw).
-  /// \param state measured values of all states, in order.
+  /// \param state measured values of all states, in order; those that are not measured are not read.
   /// \param parameter values of all parameters, in order; those the law is not told are not read.
   SystemReport step(const double* state, const double* parameter) noexcept;
 
-  /// Forgets the last input: the trim. RT-SAFE.
+  /// What acts from now on instead of the input of the last report, for the observer. RT-SAFE.
+  void applied(const double* input) noexcept;
+
+  /// Forgets the last input: the trim; estimates begin as the artifact states. RT-SAFE.
   void reset() noexcept;
 
+  /// The same with these estimates of all differential states, with trim. RT-SAFE.
+  void reset(const double* estimate) noexcept;
+
  private:
+  bool read(const double* state, const double* parameter) noexcept;
+  bool predict() noexcept;
+
   SystemArtifact artifact_;
+  std::optional<SystemObserver> observer_;
   std::array<double, kMaxSignals> signal_{};
   std::array<double, kMaxInputs> last_{};
+  std::array<double, kMaxPremises> premise_{};  // of the last sample, in its box
+  bool has_sample_ = false;
   Eigen::MatrixXd gain_;
   Eigen::VectorXd state_;
   Eigen::VectorXd input_;

@@ -18,11 +18,11 @@ struct SystemSample {
   bool realtime = false;                       ///< memory locked and SCHED_FIFO
   std::int64_t drops = 0;                      ///< samples that the ring could not take so far
   std::int64_t step_ns = 0;                    ///< duration of the step
-  std::array<double, kMaxStates> measured{};   ///< states
+  std::array<double, kMaxStates> measured{};   ///< states: as they were read, or estimated
   InputArray commanded{};                      ///< before limits
   InputArray applied{};                        ///< what the plant got
   std::array<double, kMaxPremises> premise{};  ///< after clamping
-  double level = 0.0;                          ///< V of the measured states
+  double level = 0.0;                          ///< V of the states as the law used them
 };
 
 /// The telemetry of a run on its way out.

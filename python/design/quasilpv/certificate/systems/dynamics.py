@@ -14,10 +14,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from flint import arb, arb_mat
 
+from quasilpv.certificate.exact.program_ranges import outputs_of
 from quasilpv.certificate.exact.program_values import program_values
 from quasilpv.certificate.exact.tangents import Tangent
 from quasilpv.certificate.exact.vertex_tables import VertexTable
@@ -56,16 +58,44 @@ class Dynamics:
 
     def closed(self, cell: Sequence[arb]) -> arb_mat:
         """See the module."""
+        return self._in_region(self._closed_at(cell, program_values(self.artifact.model.premises.code, signal=cell)))
+
+    def untold(self, cell: Sequence[arb]) -> arb_mat:
+        """``R^-1 (A_cl - A_told) R``, A_told the closed loop of the model at the premises as the law is told them."""
         model = self.artifact.model
-        z = program_values(model.premises.code, signal=cell)
-        E, A, B = (at(X, z) for X in (model.E, model.A, model.B))
-        feedback = B * self.gain(cell)
-        return self._in_region(_solve(part(E, 0, self.q, 0, self.q), self._eliminated(A, feedback)))
+        told = program_values(self.artifact.law.schedule.code, signal=cell)
+        true = program_values(model.premises.code, signal=cell)
+        if not self._untold_is_direct:
+            return self._in_region(self._closed_at(cell, true) - self._closed_at(cell, told))
+        added, gain = arb_mat(self.q, self.q), self.gain(cell)
+        for p in self._untold_premises:
+            A, B = (constant(np.array(X.coefficients[p])) for X in (model.A, model.B))
+            added = added + (A + B * gain) * (true[p] - told[p])
+        return self._in_region(_solve(at(model.E, true), added))
+
+    @cached_property
+    def _untold_premises(self) -> list[int]:
+        """Those whose program is another one for the law than for the model."""
+        programs = (outputs_of(own.code) for own in (self.artifact.model.premises, self.artifact.law.schedule))
+        pairs = enumerate(zip(*programs, strict=True))
+        return [p for p, (true, told) in pairs if [*map(tuple, true)] != [*map(tuple, told)]]
+
+    @property
+    def _untold_is_direct(self) -> bool:
+        """Whether the difference is a sum over these premises: no cell is then wide twice."""
+        slopes = self.artifact.model.E.coefficients
+        return self.q == self.n and not any(any(map(any, slopes[p])) for p in self._untold_premises)
 
     def slope(self, cell: Sequence[arb]) -> arb_mat:
         """See the module."""
         E, A = self._partials(cell)
         return self._in_region(_solve(E, self._eliminated(A, arb_mat(self.n, self.q))))
+
+    def _closed_at(self, cell: Sequence[arb], z: Sequence[arb]) -> arb_mat:
+        model = self.artifact.model
+        E, A, B = (at(X, z) for X in (model.E, model.A, model.B))
+        feedback = B * self.gain(cell)
+        return _solve(part(E, 0, self.q, 0, self.q), self._eliminated(A, feedback))
 
     def curvature(self, cell: Sequence[arb]) -> list[arb_mat]:
         """See the module; as many as differential states.
