@@ -9,6 +9,10 @@ without the moment of inertia of the rod.
 
     design synth examples/systems/cart_pole.py:cart_pole --decay 1 --input-limit u=60 -o out/cart_pole
     design simulate out/cart_pole/artifact.json --start th=0.2
+
+and with place and angle measured, both speeds estimated:
+
+    design synth examples/systems/cart_pole.py:cart_pole --decay 1 --input-limit u=60 --measured p,th -o out/observed
 """
 
 import quasilpv as ql

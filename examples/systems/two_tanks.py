@@ -6,6 +6,10 @@ h1, h2: levels, m; u: inflow, m^3/s; around the levels at which an inflow of 0.0
 
     design synth examples/systems/two_tanks.py:two_tanks --decay 0.05 --input-limit u=0.006 -o out/two_tanks
     design simulate out/two_tanks/artifact.json --start h2=0.15
+
+and with the level of the second tank measured alone:
+
+    design synth examples/systems/two_tanks.py:two_tanks --decay 0.05 --input-limit u=0.006 --measured h2 --rate-hz 10
 """
 
 import quasilpv as ql

@@ -154,7 +154,11 @@ TEST(SystemObserver, is_refused_where_it_does_not_fit_the_system) {
   EXPECT_THAT(refused([](Json& t) { t["observer"]["measured"] = {"w"}; }), HasSubstr("observer.measured"));
   EXPECT_THAT(refused([](Json& t) { t["observer"]["gain"] = {{1.0, 2.0}, {0.0, 0.0}}; }), HasSubstr("observer.gain"));
   EXPECT_THAT(refused([](Json& t) { t["observer"]["start"] = {0.0}; }), HasSubstr("observer.start"));
-  EXPECT_THAT(refused([](Json& t) { t["schema_version"] = 1; }), HasSubstr("observer"));
+  EXPECT_THAT(refused([](Json& t) {
+                t["schema_version"] = 1;
+                t["law"].erase("premise_fault_s");
+              }),
+              HasSubstr("observer"));
 }
 
 TEST(EquationPlant, has_the_residual_the_slope_and_the_rates_of_its_equations) {

@@ -27,6 +27,7 @@ namespace {
 
 using ::quasilpv::testing::json_twin;
 using ::quasilpv::testing::refusal;
+using ::quasilpv::testing::second_table;
 using ::quasilpv::testing::system_table;
 using ::testing::HasSubstr;
 
@@ -245,8 +246,7 @@ TEST(SystemLoop, when_premises_stay_outside_their_box_expect_degraded_then_a_fau
 
 TEST(SystemLoop, when_the_artifact_states_a_policy_for_premises_outside_expect_the_loop_to_keep_it) {
   const auto loop_with = [](const Json& policy) {
-    Json table = system_table();
-    table["schema_version"] = 2;
+    Json table = second_table();
     table["law"]["premise_fault_s"] = policy;
     return SystemLoop(SystemArtifact::parse(json_twin(table), "test"), {});
   };

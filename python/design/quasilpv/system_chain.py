@@ -16,7 +16,7 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
@@ -53,6 +53,8 @@ class StabiliseOptions(TypedDict, total=False):
     disturbance: Mapping[str, float]
     performance: Mapping[str, float]
     premise_fault_s: float | None
+    measured: Sequence[str]
+    start_estimate: Mapping[str, float]
     parameters: Mapping[str, float]
     allow_unproved_rate: bool
 
@@ -205,7 +207,8 @@ def stabilise(system: SystemLike, **options: Unpack[StabiliseOptions]) -> System
         system: a `DescriptorSystem`, a function of parameters that makes one, or a reference as on the command line.
         **options: ``objective`` (``largest-region``, ``fastest``, ``least-gain``, ``least-l2-gain``),
             ``decay_rate`` (1/s), ``input_limits`` by name, ``rate_hz``, ``speed`` (1/s), ``share``, ``disturbance`` and
-            ``performance`` by name; ``premise_fault_s``; ``parameters`` of the function; ``allow_unproved_rate``.
+            ``performance`` by name; ``premise_fault_s``; ``measured``, the names of the states that the law reads, and
+            ``start_estimate`` by name of others; ``parameters`` of the function; ``allow_unproved_rate``.
 
     Raises:
         InputError: something does not exist or does not fit.

@@ -75,7 +75,7 @@ SystemArtifact SystemArtifact::parse(std::string_view bytes, const std::string& 
   artifact.differential_ = static_cast<int>(root["model"]["differential"].integer(1, states));
   const Field law = root["law"];
   law.only(is_second ? std::vector<std::string>{"kind", "gain", "schedule", "premise_fault_s"}
-                      : std::vector<std::string>{"kind", "gain", "schedule"});
+                     : std::vector<std::string>{"kind", "gain", "schedule"});
   if (is_second) {
     const Field policy = law["premise_fault_s"];
     artifact.premise_fault_s_ = policy.is_null() ? kInfinity : policy.non_negative();

@@ -41,8 +41,8 @@ class SystemSession {
   std::int64_t seq() const noexcept { return seq_; }
   double time_s() const noexcept { return static_cast<double>(seq_) * sample_period_s(); }
 
-  /// What the controller gets to see of sample k = seq(): states that are measured, then the parameters that it knows; 0
-  /// for the others. Repeatable: the noise of a sample is drawn once.
+  /// What the controller gets to see of sample k = seq(): states that are measured, then the parameters that it knows;
+  /// 0 for the others. Repeatable: the noise of a sample is drawn once.
   const SignalArray& measured() const noexcept { return measured_; }
   /// The states at t_k, with trim.
   const std::vector<double>& truth() const noexcept { return truth_; }

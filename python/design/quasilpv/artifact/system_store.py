@@ -10,7 +10,12 @@ import numpy as np
 from quasilpv.artifact.store import CBOR_NAME, JSON_NAME
 from quasilpv.documents.canonical import canonical_cbor, canonical_json, parse_document
 from quasilpv.documents.strict_model import validate
-from quasilpv.documents.system_artifact import SAMPLING_METHODS, SCHEMA, SystemArtifactDocument
+from quasilpv.documents.system_artifact import (
+    SAMPLING_METHODS,
+    SCHEMA,
+    ObserverDocument,
+    SystemArtifactDocument,
+)
 from quasilpv.files import read_bytes, write_atomically
 
 
@@ -50,7 +55,8 @@ def system_summary(artifact: SystemArtifactDocument) -> dict[str, Any]:
         "hash": artifact.hash,
         "design_hash": artifact.design_hash,
         "creator": f"{artifact.creator.tool} {artifact.creator.version}",
-        "law": f"u = K(z) ({', '.join(names)}), deviations from the trim; added, not subtracted",
+        "law": f"u = K(z) ({', '.join(names)}), deviations from the trim; added, not subtracted"
+        + ("" if artifact.observer is None else "; what is not measured is estimated"),
         "sample_period_s": artifact.sample_period_s,
         "decay_rate_per_s": artifact.region.decay_rate_per_s,
         "states": {signal.name: _interval(signal.low, signal.high, signal.trim) for signal in artifact.states},
@@ -60,6 +66,7 @@ def system_summary(artifact: SystemArtifactDocument) -> dict[str, Any]:
             for signal in artifact.parameters
         },
         "region_reach": dict(zip(names, reach, strict=True)),
+        **({} if artifact.observer is None else {"observer": _observer(artifact, artifact.observer)}),
         "largest_gain": float(np.abs([vertex for block in gain.blocks for vertex in block.vertices]).max()),
         "premises": dict(
             zip(
@@ -86,6 +93,27 @@ def _outside(fault_s: float | None) -> str:
     if fault_s is None:
         return "clamped, no fault"
     return "a fault at once" if fault_s == 0.0 else f"clamped, a fault after {fault_s:g} s"
+
+
+def _observer(artifact: SystemArtifactDocument, own: ObserverDocument) -> dict[str, Any]:
+    """``largest_error`` is that of one estimate alone, at the trim: ``nu |e|_Q = 1`` there."""
+    states = artifact.states[: artifact.model.differential]
+    alone = 1.0 / (own.weight * np.sqrt(np.diag(np.linalg.inv(np.array(own.lyapunov)))))
+    return {
+        "measured": list(own.measured),
+        "start": {
+            signal.name: signal.trim + value
+            for signal, value in zip(states, own.start, strict=True)
+            if signal.name not in own.measured
+        },
+        "largest_error": {
+            signal.name: float(value)
+            for signal, value in zip(states, alone, strict=True)
+            if signal.name not in own.measured
+        },
+        "largest_gain": float(np.abs(own.gain).max()),
+        "weight": own.weight,
+    }
 
 
 def _interval(low: float | None, high: float | None, trim: float) -> str:

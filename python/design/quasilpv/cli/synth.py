@@ -111,6 +111,22 @@ def synth_command(
             "  [default: 1]",
         ),
     ] = None,
+    measured: Annotated[
+        str | None,
+        typer.Option(
+            "--measured",
+            metavar="NAME,...",
+            help="Of a system: the states that the law reads; an observer estimates the others.  [default: all states]",
+        ),
+    ] = None,
+    start_estimate: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--start-estimate",
+            metavar="NAME=VALUE",
+            help="First estimate of a state that is not measured; may be repeated.  [default: its trim]",
+        ),
+    ] = None,
     set_: SetOption = None,
     allow_unproved_rate: Annotated[
         bool,
@@ -127,7 +143,8 @@ def synth_command(
     arithmetic, if the robust gate is not passed, or if the torque or slew limits cannot deliver what the design needs.
 
     Of a system the controller comes with the largest region inside its domain and its input limits that no solution
-    leaves, exact; exit code 1 too if the sampling rate is not proved to keep it.
+    leaves, exact; exit code 1 too if the sampling rate is not proved to keep it. With --measured the law reads these
+    states only: what is proved then holds for the state and the error of the estimates together.
 
     \b
     Examples:
@@ -143,6 +160,8 @@ def synth_command(
         "--disturbance": disturbance,
         "--performance": performance,
         "--premise-policy": premise_policy,
+        "--measured": measured,
+        "--start-estimate": start_estimate,
         "--set": set_,
         "--allow-unproved-rate": allow_unproved_rate or None,
     }
@@ -164,6 +183,8 @@ def synth_command(
             "share": share,
             "disturbance": numbers_by_name("--disturbance", disturbance) or None,
             "performance": numbers_by_name("--performance", performance) or None,
+            "measured": None if measured is None else tuple(part.strip() for part in measured.split(",")),
+            "start_estimate": numbers_by_name("--start-estimate", start_estimate) or None,
         }
         made = write_system(
             robot_id,

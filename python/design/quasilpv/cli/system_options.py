@@ -154,6 +154,7 @@ def rows_of(run: SystemRun) -> list[tuple[str, str]]:
         ("largest V", f"{answer['largest_level']:.4g}"),
         ("final state", states),
         ("largest input", inputs),
+        *_errors(answer),
         ("flags", ", ".join(answer["flags"]) or "none"),
     ]
     gain = gain_of(run)
@@ -167,11 +168,23 @@ def rows_of(run: SystemRun) -> list[tuple[str, str]]:
     return rows
 
 
+def _errors(answer: dict[str, Any]) -> list[tuple[str, str]]:
+    if "largest_error" not in answer:
+        return []
+    largest, final = (
+        ", ".join(f"{name} {value:.4g}" for name, value in answer[member].items())
+        for member in ("largest_error", "final_error")
+    )
+    return [("estimation error", f"at most {largest}; at the end {final}")]
+
+
 def notes_of(run: SystemRun) -> list[str]:
     """What has to be said of a run besides its numbers."""
     notes = []
     if run.level[0] > 1.0:
         notes.append("the start is outside the region: nothing is proved of this run")
+    elif run.start_level > 1.0:
+        notes.append("the estimates start too far from the state: nothing is proved of this run")
     if run.scenario.disturbances:
         notes.append("the region is proved without disturbance: this run with one is beside it")
     if not run.scenario.has_exact_sensors:
@@ -181,7 +194,7 @@ def notes_of(run: SystemRun) -> list[str]:
 
 def code_of(run: SystemRun) -> int:
     """Exit code 1 if a run that began inside its region did not stay."""
-    return 0 if run.stayed or run.level[0] > 1.0 else 1
+    return 0 if run.stayed or run.start_level > 1.0 else 1
 
 
 def animate_system(

@@ -86,12 +86,15 @@ def print_system(answer: Mapping[str, Any]) -> None:
     """What `write_system` found, for people."""
     reach = ", ".join(f"|{name}| < {value:.4g}" for name, value in answer["region_reach"].items())
     sampling = answer["sampling"]
-    proved = sampling if isinstance(sampling, str) else f"proved; up to {sampling['longest_period_s']:.4g} s would be"
+    proved = sampling if isinstance(sampling, str) else "proved"
+    if isinstance(sampling, Mapping) and "longest_period_s" in sampling:
+        proved += f"; up to {sampling['longest_period_s']:.4g} s would be"
     certificate = answer["verification"]["certificate"]
     evidence = ", ".join(f"{count} {kind}" for kind, count in certificate["evidence"].items() if count)
     rows = [
         ("law", answer["law"]),
         ("region reaches", reach),
+        *_observer(answer),
         ("decay rate", f"{answer['decay_rate_per_s']:.4g} 1/s"),
         ("largest gain", f"{answer['largest_gain']:.4g}"),
         *_performance(answer),
@@ -104,6 +107,19 @@ def print_system(answer: Mapping[str, Any]) -> None:
     print_table(answer["name"], ("", ""), rows, left_columns=2)
     for path in answer["artifact"].values():
         print_note(f"wrote {path}")
+
+
+def _observer(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
+    if "observer" not in answer:
+        return []
+    own = answer["observer"]
+    alone = ", ".join(f"|{name}| < {value:.4g}" for name, value in own["largest_error"].items())
+    start = ", ".join(f"{name} {value:.4g}" for name, value in own["start"].items())
+    return [
+        ("measured", ", ".join(own["measured"])),
+        ("estimated", f"{', '.join(own['start'])}; at first {start}"),
+        ("errors allowed", f"{alone}, at the trim; in all sqrt(V) + {own['weight']:.4g} |e| < 1"),
+    ]
 
 
 def _performance(answer: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -59,7 +59,7 @@ class SystemRun:
         artifact: the controller.
         scenario: what was run.
         time_s: of the samples, (N,).
-        state, measured: (N, n), the truth and what the controller was told of it, with their trim.
+        state, measured: (N, n), the truth and what the law used of it, measured or estimated, with their trim.
         input, commanded: (N, m), what acted and what the law asked for before limits, with their trim.
         premise: (N, p), clamped to its box.
         level: V of the truth, (N,): at most 1 in the region.
@@ -88,9 +88,35 @@ class SystemRun:
         return tuple(text for bit, text in SYSTEM_FLAGS.items() if union & bit)
 
     @property
+    def estimation_error(self) -> dict[str, FloatArray]:
+        """Of every estimated state, by name, truth less estimate, (N,)."""
+        if self.artifact.observer is None:
+            return {}
+        names = [signal.name for signal in self.artifact.states[: self.artifact.model.differential]]
+        error = self.state - self.measured
+        return {name: error[:, k] for k, name in enumerate(names) if name not in self.artifact.observer.measured}
+
+    @property
+    def start_level(self) -> float:
+        """V at the start; with an observer ``(|x|_P + nu |e|_Q)^2`` there, which bounds V from then on: at most 1 if
+        the run begins where something is proved.
+
+        What is measured is taken to be exact: the first measurement is the first estimate of it.
+        """
+        own = self.artifact.observer
+        if own is None:
+            return float(self.level[0])
+        error = np.zeros(self.artifact.model.differential)
+        for k, signal in enumerate(self.artifact.states[: len(error)]):
+            if signal.name not in own.measured:
+                error[k] = self.state[0, k] - self.measured[0, k]
+        size = np.sqrt(error @ np.linalg.solve(np.array(own.lyapunov), error))
+        return float((np.sqrt(self.level[0]) + own.weight * size) ** 2)
+
+    @property
     def stayed(self) -> bool:
-        """Whether no state left its domain, and V never exceeded its start or, in what no proof is of, 1."""
-        bound = self.level[0] if self.scenario.is_nominal else max(self.level[0], 1.0)
+        """Whether no state left its domain, and V never exceeded `start_level` or, in what no proof is of, 1."""
+        bound = self.start_level if self.scenario.is_nominal else max(self.start_level, 1.0)
         return self.exit is None and bool(self.level.max() <= max(bound, 1e-300) * (1.0 + 1e-9))
 
     def first_difference(self, other: SystemRun) -> str | None:
@@ -123,6 +149,15 @@ class SystemRun:
                 signal.name: float(np.abs(self.input[:, k] - signal.trim).max())
                 for k, signal in enumerate(self.artifact.inputs)
             },
+            **(
+                {}
+                if self.artifact.observer is None
+                else {
+                    "start_level": self.start_level,
+                    "largest_error": {name: float(np.abs(e).max()) for name, e in self.estimation_error.items()},
+                    "final_error": {name: float(e[-1]) for name, e in self.estimation_error.items()},
+                }
+            ),
             "exact_sensors": self.scenario.has_exact_sensors,
             "disturbed": sorted({term.signal for term in self.scenario.disturbances}),
             "flags": list(self.flags),

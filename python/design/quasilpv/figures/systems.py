@@ -57,6 +57,8 @@ def signals_figure(run: SystemRun) -> Figure:
         axes[-1].set_ylim(bottom=max(float(level.min()) / 2.0, 1e-10))
         axes[-1].set_ylabel("V", rotation=0, ha="right", va="center")
         told = "" if exact else ", measured grey"
+        if artifact.observer is not None:
+            told = ", measured or estimated grey"
         axes[-1].set_xlabel(f"time (s); states blue{told}, inputs red, V ≤ 1 in the region, limits dashed")
         return figure
 

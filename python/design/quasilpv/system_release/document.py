@@ -22,6 +22,7 @@ from quasilpv.documents.system_artifact import (
     SAMPLING_METHODS,
     SCHEMA,
     SCHEMA_VERSION,
+    ObserverDocument,
     SamplingDocument,
     SystemArtifactDocument,
 )
@@ -32,7 +33,10 @@ from quasilpv.systems.descriptor.system import DescriptorSystem
 
 
 def artifact_of(
-    design: RegionalDesign, sampling: SamplingDocument | None = None, verification: dict[str, Any] | None = None
+    design: RegionalDesign,
+    sampling: SamplingDocument | None = None,
+    verification: dict[str, Any] | None = None,
+    observer: ObserverDocument | None = None,
 ) -> SystemArtifactDocument:
     """The artifact of a design.
 
@@ -40,6 +44,7 @@ def artifact_of(
         design: what was found.
         sampling: how its period is proved; None: it is not.
         verification: what a checker found.
+        observer: of the states that are not measured.
 
     Raises:
         InputError: an expression has no program.
@@ -82,6 +87,7 @@ def artifact_of(
             "decay_rate_per_s": design.decay_rate,
             "speed_per_s": request.speed,
         },
+        "observer": None if observer is None else observer.model_dump(mode="json"),
         "plant": plant_document(system, _symbols(system)),
         "witness": {
             "units": [units.T.tolist(), units.S.tolist(), units.D.tolist(), [units.c]],
@@ -158,4 +164,6 @@ def _inputs(request: RegionalRequest) -> dict[str, Any]:
         "share": request.share,
         **({"disturbance": dict(request.disturbance)} if request.disturbance else {}),
         **({"performance": dict(request.performance)} if request.performance else {}),
+        **({"measured": list(request.measured)} if request.measured else {}),
+        **({"start_estimate": dict(request.start_estimate)} if request.start_estimate else {}),
     }

@@ -65,7 +65,7 @@ class Sampled:
 
     def at(self, rate_hz: float) -> Sampled:
         """The same design, sampled at another rate."""
-        return replace(self, design=replace(self.design, request=replace(self.design.request, rate_hz=rate_hz)))
+        return replace(self, design=self.design.at(rate_hz))
 
     @property
     def longest_s(self) -> float:

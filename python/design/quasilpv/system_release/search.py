@@ -168,3 +168,11 @@ def _next_rate(least_hz: float) -> float:
     """The next of 1, 2, 5, 10, ... times a power of ten above, with a percent to spare."""
     power = 10.0 ** floor(log10(1.01 * least_hz))
     return next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= 1.01 * least_hz)
+
+
+def rates_from(least_hz: float, most_hz: float) -> Iterator[float]:
+    """A rate, then the next ones of 1, 2, 5, 10, ... times a power of ten."""
+    rate = least_hz
+    while rate <= most_hz:
+        yield rate
+        rate = _next_rate(1.02 * rate)

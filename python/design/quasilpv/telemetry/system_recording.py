@@ -141,7 +141,8 @@ def write_system_run(
         InputError: the file cannot be written.
     """
     artifact, seq = documents.artifact, np.arange(len(columns["state"]))
-    told = np.hstack([columns["measured"], np.tile(_told(documents), (seq.size, 1))])
+    read = np.where(artifact.measured, columns["measured"], 0.0)
+    told = np.hstack([read, np.tile(_told(documents), (seq.size, 1))])
     known = {**columns, "told": told}
     streams = {channel: system_messages(channel, artifact, seq, known) for channel in _MEMBERS}
     for records in (streams[COMMAND], streams[TELEMETRY]):

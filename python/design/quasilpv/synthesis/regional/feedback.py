@@ -80,14 +80,20 @@ class RegionalDesign:
     units: Units
     witness: dict[str, FloatArray]
 
+    def at(self, rate_hz: float) -> RegionalDesign:
+        """The same, sampled at another rate."""
+        return replace(self, request=replace(self.request, rate_hz=rate_hz))
+
     @property
     def assumed(self) -> tuple[str, ...]:
-        """What the inequalities rely on and nothing proves, in words; that of the domain is what the region is for."""
+        """What the inequalities rely on and nothing proves, in words.
+
+        Not that of the domain, which is what the region is for, nor of the state where there is an observer for it.
+        """
         relied = reliances(COMPENSATION, self.model)
+        shown = {Reliance.DOMAIN, Reliance.STATE} if self.request.measured else {Reliance.DOMAIN}
         return tuple(
-            f"{one.name}: {one.detail}"
-            for one in relied
-            if one.status is Status.ASSUMED and one.reliance is not Reliance.DOMAIN
+            f"{one.name}: {one.detail}" for one in relied if one.status is Status.ASSUMED and one.reliance not in shown
         )
 
     @property

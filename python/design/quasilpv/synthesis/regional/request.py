@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import Literal, TypeAlias, get_args
@@ -37,6 +37,8 @@ class RegionalRequest:
         performance: by name of a state or an input, the deviation that counts as 1.
         premise_fault_s: for so long a premise may be outside its box, clamped, before the loop goes into a fault, s; 0:
             at once, None: always.
+        measured: names of the differential states that the law reads; the others are estimated. Empty: it reads all.
+        start_estimate: by name of a state that is not measured, its first estimate, with trim; its trim if not named.
 
     Raises:
         InputError: a number is out of range or a name is unknown.
@@ -52,6 +54,8 @@ class RegionalRequest:
     disturbance: Mapping[str, float] = field(default_factory=dict)
     performance: Mapping[str, float] = field(default_factory=dict)
     premise_fault_s: float | None = PREMISE_FAULT_S
+    measured: Sequence[str] = ()
+    start_estimate: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse what has no meaning."""
@@ -79,6 +83,33 @@ class RegionalRequest:
             raise InputError(source, "decay", self.decay_rate, "none: fastest finds it")
 
         self._check_performance()
+        self._check_measured()
+
+    def _check_measured(self) -> None:
+        system, source = self.system, self.system.name
+        names = [symbol.name for symbol in system.state[: system.differential]]
+        algebraic = [symbol.name for symbol in system.state[system.differential :]]
+        for name in self.measured:
+            if name in algebraic:
+                raise InputError(source, "measured", name, "differential states: an algebraic one follows from them")
+            if name not in names:
+                raise InputError(source, "measured", name, one_of(names, name))
+        if len(set(self.measured)) != len(self.measured):
+            raise InputError(source, "measured", ", ".join(self.measured), "each name once")
+        if self.measured and set(self.measured) == set(names):
+            raise InputError(source, "measured", "every differential state", "some of them, or no such option")
+        estimated = [name for name in names if name not in self.measured] if self.measured else []
+        for name, value in self.start_estimate.items():
+            if name not in estimated:
+                expected = one_of(estimated, name) if estimated else "none: no state is estimated"
+                raise InputError(source, "start estimate", name, expected)
+            if not isfinite(value):
+                raise InputError(source, f"start estimate {name}", value, "a finite number")
+        for premise in system.premises if self.measured else ():
+            used = {symbol.name for symbol in premise.expression.free_symbols}
+            if used & set(algebraic):
+                got = f"{premise.name} = {premise.expression}"
+                raise InputError(source, "measured", got, "premises of differential states: the others are estimated")
 
     def _check_performance(self) -> None:
         source, needs = self.system.name, self.objective == "least-l2-gain"
