@@ -31,7 +31,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples" / "systems"
 RATE_HZ = 1e5
 """At which the designs are released, proved or not: what is proved is looked for afterwards."""
 
-CELLS = 1500
+CELLS = 3000
 """Of the sharper bound; more take longer than the periods gain."""
 
 FACTORS = (16.0, 8.0, 4.0, 2.0, 1.5)

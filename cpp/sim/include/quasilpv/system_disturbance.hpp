@@ -32,7 +32,7 @@ class SystemDisturbance {
  public:
   SystemDisturbance() = default;
   /// INIT-ONLY.
-  explicit SystemDisturbance(std::vector<DisturbanceTerm> terms);
+  explicit SystemDisturbance(const std::vector<DisturbanceTerm>& terms);
 
   /// Draws the noise of the next sample, in the order of the terms: once per sample.
   void draw();

@@ -5,7 +5,7 @@
 
 namespace quasilpv {
 
-SystemDisturbance::SystemDisturbance(std::vector<DisturbanceTerm> terms) {
+SystemDisturbance::SystemDisturbance(const std::vector<DisturbanceTerm>& terms) {
   for (const DisturbanceTerm& term : terms) {
     sources_.push_back({term, GaussianNoise(term.seed), term.size});
   }

@@ -17,7 +17,7 @@ CELLS = 400
 SHARPER_CELLS = 2500
 """The same of the sharper bound."""
 
-MOST_CUT = 3
+MOST_CUT = 6
 """Signals of which so many cells can be made that the sharper bound is worth its time for every candidate."""
 
 MOST_GAIN = 100.0

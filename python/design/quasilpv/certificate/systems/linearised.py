@@ -21,18 +21,19 @@ in ball arithmetic over cells of x_k, u_k and the parameters, all t included: a 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import factorial, inf
+from math import factorial, inf, isfinite
 
 import numpy as np
 from flint import arb, arb_mat
 
+from quasilpv.arrays import FloatArray
 from quasilpv.certificate.exact.claims import Claim
 from quasilpv.certificate.systems.balls import beside, is_below, largest_eigenvalue, norm, split
-from quasilpv.certificate.systems.cells import Box, Cells, halves, widest
+from quasilpv.certificate.systems.cells import Box, Cells, halves
 from quasilpv.documents.system_artifact import SystemArtifactDocument
 
 CELLS = 6000
@@ -49,6 +50,15 @@ TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 ROUNDING = 1e-9
 """Added to eigenvalues found in doubles, of the largest entry."""
+
+NARROW = 1e-3
+"""Signals along which a cell is so narrow are not cut, in units of its largest width."""
+
+POINT = 1e-9
+"""A cell that is narrower along every signal, and fails, ends the search."""
+
+RELIABLE = 8
+"""Cuts along every signal, after which what they gained is believed."""
 
 MIDDLES = 10
 """Of so many cells that are cut, the middle of one is looked at, whether it fails too."""
@@ -69,6 +79,51 @@ class _Sample:
     closed: arb_mat
     slope: arb_mat
     curving: float
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A cell, what is enclosed of it (None if no sample lies in it), and by how much it fails."""
+
+    box: Box
+    own: _Sample | None
+    missing: float
+
+
+class _Branching:
+    """Along which signal cells are cut: most signals matter little, and which ones do is learnt.
+
+    Of the first cells the halves along every signal are looked at, and the signal is taken whose halves fail least.
+    What one cut gained, per relative width of the cell, is averaged for every signal; once each was tried often
+    enough, the signal with the largest gain to be expected is taken unseen (pseudo-costs; Achterberg, Koch and Martin
+    2005, Branching rules revisited).
+    """
+
+    def __init__(self, whole: Box, cut: Sequence[int]) -> None:
+        """Nothing is learnt yet."""
+        self._whole, self._cut = whole, cut
+        self._gained, self._tried = dict.fromkeys(cut, 0.0), dict.fromkeys(cut, 0)
+
+    def halved(self, seen: _Seen, look: Callable[[Box], _Seen]) -> list[_Seen]:
+        """Both halves, the worse one last: it is looked at first, so that where nothing helps is soon found.
+
+        None of a cell that is a point, nearly.
+        """
+        widths = {k: (seen.box[k][1] - seen.box[k][0]) / (self._whole[k][1] - self._whole[k][0]) for k in self._cut}
+        if max(widths.values()) < POINT:
+            return []
+        wide = [k for k in self._cut if widths[k] >= NARROW * max(widths.values())]
+        if not isfinite(seen.missing):
+            wide = [max(wide, key=lambda k: widths[k])]
+        elif all(self._tried[k] >= RELIABLE for k in wide):
+            wide = [max(wide, key=lambda k: self._gained[k] / self._tried[k] * widths[k])]
+        pairs = {k: sorted(map(look, halves(seen.box, k)), key=lambda half: half.missing) for k in wide}
+        for k, pair in pairs.items():
+            gained = seen.missing - 0.5 * (pair[0].missing + pair[1].missing)
+            if isfinite(gained):
+                self._gained[k] += max(gained, 0.0) / widths[k]
+                self._tried[k] += 1
+        return min(pairs.items(), key=lambda item: (item[1][0].missing + item[1][1].missing, -widths[item[0]]))[1]
 
 
 class LinearisedLoop:
@@ -110,21 +165,27 @@ class LinearisedLoop:
 
     def cells_of_proof(self, period_s: float) -> int | None:
         """How many cells were looked at until every sample was seen to contract; None if that was not seen."""
-        cut = self.cut
-        pending = self.cells.first(cut)
+        branching = _Branching(self.cells.whole, self.cut)
+        pending = [self._look(box, period_s) for box in self.cells.first(self.cut)]
         for count in range(self._most_cells):
             if not pending:
                 return count
-            box = pending.pop()
-            own = None if self.cells.is_outside(box) else self._sample(self.cells.balls(box))
-            if own is None or self._contracts(own, period_s):
+            seen = pending.pop()
+            if seen.own is None or (seen.missing == 0.0 and self._contracts(seen.own, period_s)):
                 continue
             if count % MIDDLES == 0:
-                middle = self._sample(self.cells.balls(_middle(box)))
+                middle = self._sample(self.cells.balls(_middle(seen.box)))
                 if middle is not None and not self._contracts(middle, period_s):
                     return None
-            pending += halves(box, widest(box, self.cells.whole, cut))
+            found = branching.halved(seen, lambda box: self._look(box, period_s))
+            if not found:
+                return None
+            pending += found
         return None
+
+    def _look(self, box: Box, period_s: float) -> _Seen:
+        own = None if self.cells.is_outside(box) else self._sample(self.cells.balls(box))
+        return _Seen(box, own, 0.0 if own is None else self._missing(own, period_s))
 
     def is_hopeless(self, period_s: float) -> bool:
         """Whether some samples on the border of the region fail without what the curvature adds: no cells are tried."""
@@ -175,14 +236,28 @@ class LinearisedLoop:
 
     def _is_below(self, decay: arb_mat, second: arb_mat, t: float, allowed: float) -> bool:
         """Whether ``A_cl + A_cl' + t S < allowed I``: the best theta is found in doubles, then decided in balls."""
+        guesses = self._guesses(decay, second, t)
+        best = int(np.argmin(guesses - 2.0 * self._alpha * np.array(SHARES)))
+        bound = allowed + 2.0 * self._alpha * SHARES[best] * (1.0 - ROUNDING)
+        return guesses[best] < bound and is_below((1 - arb(SHARES[best])) * decay + arb(t) * second, bound)
+
+    def _guesses(self, decay: arb_mat, second: arb_mat, t: float) -> FloatArray:
+        """The largest eigenvalue for every theta, in doubles."""
         (own, own_radius), (added, added_radius) = split(decay), split(second)
         theta = np.array(SHARES)[:, None, None]
         middle, radius = (1.0 - theta) * own + t * added, (1.0 - theta) * own_radius + t * added_radius
         guesses = np.linalg.eigvalsh(0.5 * (middle + middle.transpose(0, 2, 1)))[:, -1]
-        guesses += np.linalg.norm(radius, axis=(1, 2)) + ROUNDING * np.abs(own).max()
-        best = int(np.argmin(guesses - 2.0 * self._alpha * theta[:, 0, 0]))
-        bound = allowed + 2.0 * self._alpha * SHARES[best] * (1.0 - ROUNDING)
-        return guesses[best] < bound and is_below((1 - arb(SHARES[best])) * decay + arb(t) * second, bound)
+        return np.asarray(guesses + np.linalg.norm(radius, axis=(1, 2)) + ROUNDING * np.abs(own).max())
+
+    def _missing(self, own: _Sample, period_s: float) -> float:
+        """By how much a cell fails at the last times, in doubles; 0 if it does not."""
+        eps = own.curving * self._bending(period_s)
+        if not eps < 1.0:
+            return inf
+        second = _second(own, TIMES[-2] * period_s, period_s)
+        guesses = self._guesses(own.closed + own.closed.transpose(), second, period_s)
+        bound = -(2.0 * eps - eps * eps) / period_s
+        return max(0.0, float((guesses - 2.0 * self._alpha * np.array(SHARES)).min()) - bound)
 
     def _bending(self, t: float) -> float:
         """``L (G^2/2 - (t e^mt - G)/m)/m``, at most ``L e^2mt t^3/6``."""
