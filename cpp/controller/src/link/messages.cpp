@@ -61,6 +61,17 @@ void copy(const std::array<double, Size>& source, double (&target)[Size]) noexce
   std::copy(source.begin(), source.end(), target);
 }
 
+/// What telemetry says of a step, whatever was measured.
+template <class Sample, class Message>
+void copy_step(const Sample& sample, Message& message) noexcept {
+  message.seq = sample.seq;
+  message.state = static_cast<std::int32_t>(sample.state);
+  message.flags = static_cast<std::int32_t>(sample.flags);
+  message.realtime = sample.realtime ? 1 : 0;
+  message.drops = sample.drops;
+  message.step_ns = sample.step_ns;
+}
+
 constexpr bool is_within(std::int64_t value, std::int64_t low, std::int64_t high) noexcept {
   return low <= value && value <= high;
 }
@@ -168,13 +179,8 @@ void set_gears(const GearReading& gears, measurement_v3& message) noexcept {
 
 telemetry_v2 to_message(const TelemetrySample& sample) noexcept {
   telemetry_v2 message{};
-  message.seq = sample.seq;
+  copy_step(sample, message);
   message.premises = sample.premises;
-  message.state = static_cast<std::int32_t>(sample.state);
-  message.flags = static_cast<std::int32_t>(sample.flags);
-  message.realtime = sample.realtime ? 1 : 0;
-  message.drops = sample.drops;
-  message.step_ns = sample.step_ns;
   copy(sample.reference_angle_rad, message.reference_angle_rad);
   copy(sample.reference_speed_rad_s, message.reference_speed_rad_s);
   copy(sample.reference_acceleration_rad_s2, message.reference_acceleration_rad_s2);
@@ -200,12 +206,7 @@ telemetry_v2 to_message(const TelemetrySample& sample) noexcept {
 
 signals_telemetry_v1 to_message(const SystemSample& sample) noexcept {
   signals_telemetry_v1 message{};
-  message.seq = sample.seq;
-  message.state = static_cast<std::int32_t>(sample.state);
-  message.flags = static_cast<std::int32_t>(sample.flags);
-  message.realtime = sample.realtime ? 1 : 0;
-  message.drops = sample.drops;
-  message.step_ns = sample.step_ns;
+  copy_step(sample, message);
   copy(sample.measured, message.measured);
   copy(sample.commanded, message.commanded);
   copy(sample.applied, message.applied);

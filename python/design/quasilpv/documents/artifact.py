@@ -10,7 +10,7 @@ from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from quasilpv.documents.canonical import Document, document_hash, with_hash
+from quasilpv.documents.hashed import HashedDocument
 from quasilpv.documents.law import LawDocument
 from quasilpv.documents.mechanism import Mechanism
 from quasilpv.documents.programs import MAX_JOINTS, Program
@@ -63,8 +63,8 @@ class Limits(StrictModel):
     slew_nm_per_s: tuple[Positive, ...]
 
 
-class ArtifactDocument(StrictModel, Generic[LawT]):
-    """One controller, immutable. The hash is not stored; it is computed from the content."""
+class ArtifactDocument(HashedDocument, Generic[LawT]):
+    """One controller, immutable."""
 
     schema_: Literal["quasilpv.artifact"] = Field(alias="schema")
     schema_version: Literal[1, 2]
@@ -102,16 +102,3 @@ class ArtifactDocument(StrictModel, Generic[LawT]):
         if isinstance(self.law.inertia, PolytopeTable):
             return self.law.inertia
         raise InputError(self.name, "law.inertia", f"a robot of kind {self.law.inertia.kind}", "a table")
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the canonical JSON of the content, 64 hexadecimal digits."""
-        return document_hash(self.content())
-
-    def content(self) -> Document:
-        """Return the artifact as a JSON tree without its hash."""
-        return self.model_dump(mode="json", by_alias=True)
-
-    def to_document(self) -> Document:
-        """Return the artifact as a normalised JSON tree, hash included."""
-        return with_hash(self.content())

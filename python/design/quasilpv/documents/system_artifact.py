@@ -13,7 +13,8 @@ from pydantic import Field, model_validator
 
 from quasilpv.arrays import FloatArray
 from quasilpv.documents.artifact import LONGEST_PERIOD_S, SHORTEST_PERIOD_S, Creator, Name, Sha256
-from quasilpv.documents.canonical import Document, document_hash, with_hash
+from quasilpv.documents.canonical import Document
+from quasilpv.documents.hashed import HashedDocument
 from quasilpv.documents.programs import MAX_SIGNALS, Program
 from quasilpv.documents.strict_model import FieldError, NonNegative, Number, Positive, StrictModel
 from quasilpv.documents.tables import Matrix, PolytopeTable, Vector, require_lyapunov, require_shape, require_size
@@ -178,8 +179,8 @@ class ObserverDocument(StrictModel):
     """Of h, (q,), deviations; where a state is measured, its first measurement takes its place."""
 
 
-class SystemArtifactDocument(StrictModel):
-    """One controller of a general system, immutable. The hash is not stored; it is computed from the content."""
+class SystemArtifactDocument(HashedDocument):
+    """One controller of a general system, immutable."""
 
     schema_: Literal["quasilpv.system_artifact"] = Field(alias="schema")
     schema_version: Literal[1, 2]
@@ -232,21 +233,12 @@ class SystemArtifactDocument(StrictModel):
         [[gain]], [[balance]], time = self.witness[L2_GAIN], self.witness[BALANCE], self.witness["units"][3][0]
         return gain, balance**2 * time / gain
 
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the canonical JSON of the content, 64 hexadecimal digits."""
-        return document_hash(self.content())
-
     def content(self) -> Document:
         """Return the artifact as a JSON tree without its hash, in the version it was written in."""
-        content: Document = self.model_dump(mode="json", by_alias=True)
+        content = super().content()
         if self.schema_version == 1:
             del content["law"]["premise_fault_s"], content["observer"]
         return content
-
-    def to_document(self) -> Document:
-        """Return the artifact as a normalised JSON tree, hash included."""
-        return with_hash(self.content())
 
     def __repr__(self) -> str:
         """What it is, in a few lines."""
