@@ -100,6 +100,7 @@ LAWS: Mapping[str, tuple[str, SpatialRobot]] = {
     "motor-pid": ("motor-pid", elastic_ur5("motor")),
     "motor-pid, both sides": ("motor-pid", elastic_ur5("both")),
     "link-damped": ("link-damped", elastic_ur5("both")),
+    "link-dob": ("link-dob", elastic_ur5("link")),
     **{law: (law, ur5()) for law in BASELINES},
 }
 """Laws by what rows call them, and the arms they are for."""

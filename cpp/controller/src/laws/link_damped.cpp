@@ -53,8 +53,9 @@ class LinkDampedLaw final : public AccelerationLaw<N> {
  private:
   using typename AccelerationLaw<N>::Motion;
 
-  // Before a joint is left alone its observer has that long to find what holds it there.
-  static constexpr double kSettlingS = 0.5;
+  // Before a joint is left alone its loop has that long to settle: stopped earlier, what friction does not hold comes
+  // back again and again.
+  static constexpr double kSettlingS = 2.0;
 
   void begin() noexcept override {
     was_wound_ = false;
