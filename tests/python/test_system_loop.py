@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from quasilpv import _runtime
 from quasilpv.arrays import FloatArray
 from quasilpv.artifact import write_artifact
+from quasilpv.artifact.system_store import read_system_artifact
 from quasilpv.cli.app import run
 from quasilpv.documents.canonical import canonical_json, with_hash
 from quasilpv.documents.programs import evaluate_signals
@@ -31,6 +32,7 @@ from reference.released_systems import (
     on_the_border,
     released,
     request_of,
+    runs_from_the_border,
 )
 
 # ---- run time and plant ----------------------------------------------------------------------------------------------
@@ -265,16 +267,24 @@ def commands_of(path: Path) -> list[str]:
 
 @pytest.mark.full
 @pytest.mark.parametrize("path", sorted((EXAMPLES / "systems").glob("*.py")), ids=lambda path: path.stem)
-def test_the_commands_of_an_example_end_in_a_proved_controller_and_a_run_that_stays(
+def test_the_commands_of_an_example_end_in_a_proved_controller_whose_runs_stay(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "examples").symlink_to(EXAMPLES)
     monkeypatch.chdir(tmp_path)
-    synth, simulated = (shlex.split(line)[1:] for line in commands_of(path))
+    synth, simulated, *others = (shlex.split(line)[1:] for line in commands_of(path))
     assert run([*synth, "--json"]) == 0
     made = json.loads(capsys.readouterr().out)
     assert made["sampling"] != "not proved"
+    artifact = read_system_artifact(made["artifact"]["json"])
+    assert artifact is not None
+    for start, level, flags, left in runs_from_the_border(artifact, 10_000):
+        assert (left, flags) == (None, 0), start
+        assert (np.diff(level) <= 1e-12).all(), start
     assert run([*simulated, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["level_at_start"] < 1.0  # the start that the file names is in the region
     assert answer["final_level"] < 0.01
+    for other in others:  # further designs
+        assert run([*other, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["sampling"] != "not proved"

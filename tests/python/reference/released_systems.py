@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from quasilpv import _runtime
+from quasilpv.arrays import FloatArray
 from quasilpv.documents.canonical import canonical_json
 from quasilpv.documents.strict_model import validate
 from quasilpv.documents.system_artifact import SystemArtifactDocument
+from quasilpv.experiments.system_run import SystemExperiment, level_of, scenario_of
 from quasilpv.synthesis.regional.request import RegionalRequest
 from quasilpv.system_release import release_system
 from quasilpv.systems.catalogue import system_kind
@@ -57,6 +60,25 @@ def on_the_border(artifact: SystemArtifactDocument, rng: np.random.Generator, sc
     direction = rng.normal(size=q)
     x = scale * np.linalg.cholesky(np.array(artifact.region.lyapunov)) @ (direction / np.linalg.norm(direction))
     return {s.name: float(v + s.trim) for s, v in zip(artifact.states[:q], x, strict=True)}
+
+
+def runs_from_the_border(
+    artifact: SystemArtifactDocument, count: int, samples: int = 300
+) -> Iterator[tuple[dict[str, float], FloatArray, int, tuple[float, str] | None]]:
+    """Runs in C++ from random starts just inside the region, with random parameters: start, V, flags, exit.
+
+    The artifact is read once: thousands of runs take seconds.
+    """
+    rng, runtime = np.random.default_rng(7), loaded(artifact)
+    experiment = SystemExperiment({}, {}, samples * artifact.sample_period_s, rk4_steps=2)
+    document = scenario_of(artifact, experiment, "test").to_document()
+    for _ in range(count):
+        document["start"].update(on_the_border(artifact, rng))
+        document["parameters"].update(drawn_parameters(artifact, rng))
+        scenario = _runtime.SystemScenario.parse(json.dumps(document).encode(), "test", runtime)
+        found = _runtime.simulate_system(runtime, scenario)
+        level = level_of(artifact, found["columns"]["state"])
+        yield dict(document["start"]), level, found["flags"], found["exit"]
 
 
 def drawn_parameters(artifact: SystemArtifactDocument, rng: np.random.Generator) -> dict[str, float]:

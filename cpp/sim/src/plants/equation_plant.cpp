@@ -56,7 +56,8 @@ EquationPlant::Signals EquationPlant::signals(double t, ConstVector y, ConstVect
   const int rates = artifact_.signals();
   for (int k = 0; k < states_; ++k) {
     values[static_cast<std::size_t>(k)] = y[k];
-    values[static_cast<std::size_t>(rates + k)] = y_dot[k] - added[static_cast<std::size_t>(k)];
+    values[static_cast<std::size_t>(rates) + static_cast<std::size_t>(k)] =
+        y_dot[k] - added[static_cast<std::size_t>(k)];
   }
   return values;
 }
@@ -71,7 +72,8 @@ void EquationPlant::jacobian(double t, double c_j, ConstVector y, ConstVector y_
   for (int i = 0; i < states_; ++i) {
     artifact_.jacobian()[static_cast<std::size_t>(i)].evaluate({nullptr, nullptr, nullptr, values.data()}, row.data());
     for (int j = 0; j < states_; ++j) {
-      jacobian(i, j) = c_j * row[static_cast<std::size_t>(j)] + row[static_cast<std::size_t>(states_ + j)];
+      jacobian(i, j) =
+          c_j * row[static_cast<std::size_t>(j)] + row[static_cast<std::size_t>(states_) + static_cast<std::size_t>(j)];
     }
   }
 }
@@ -83,7 +85,7 @@ void EquationPlant::partials(const Signals& values, Eigen::MatrixXd& by_rate,
     artifact_.jacobian()[static_cast<std::size_t>(i)].evaluate({nullptr, nullptr, nullptr, values.data()}, row.data());
     for (int j = 0; j < states_; ++j) {
       by_rate(i, j) = row[static_cast<std::size_t>(j)];
-      by_state(i, j) = row[static_cast<std::size_t>(states_ + j)];
+      by_state(i, j) = row[static_cast<std::size_t>(states_) + static_cast<std::size_t>(j)];
     }
   }
 }

@@ -44,7 +44,8 @@ def robust_command(
     but the artifact.
 
     Of a controller of a system: its exact plant over one sample from 2000 points of the region, worst ones climbed
-    from; sampled, no proof. With --delay, which no proof covers, in the mean over some samples.
+    from; sampled, no proof. With --delay, which no proof covers, in the mean over some samples. If it has parameters,
+    how far their intervals can grow: proved to, refuted at, unknown between.
 
     \b
     Examples:

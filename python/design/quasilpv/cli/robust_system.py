@@ -36,12 +36,13 @@ def check_system(
 
     if out is not None:
         claim_folder(out)
-    with progress(2 if artifact.parameters else 1) as steps:
+    has_margins = bool(artifact.parameters) and artifact.observer is None
+    with progress(2 if has_margins else 1) as steps:
         steps.begin(f"points of the region of {artifact.name}")
         found = grid_check(artifact, delay_s, source=source, progress=steps.parts)
         steps.end()
         margins = []
-        if artifact.parameters:
+        if has_margins:
             steps.begin("intervals of its parameters")
             margins = [margin_document(artifact, each) for each in parameter_margins(artifact, steps.parts)]
             steps.end()
@@ -52,6 +53,8 @@ def check_system(
             columns = ("parameter", "claim", "proved in", "refuted in", "")
             title = f"{source}: how far intervals of parameters can grow, before sampling"
             print_table(title, columns, _margin_rows(margins), left_columns=5)
+        elif artifact.parameters:
+            print_note("how far intervals of parameters can grow is not said: the error of an observer grows with them")
         print_table(source, ("", ""), rows_of(found), left_columns=2)
         verdict = "V falls from every point" if found.passed else "NOT passed: V does not fall from every point"
         print(f"{verdict}; sampled, not a proof")
