@@ -67,5 +67,5 @@ def test_every_fault_of_a_process_is_tested_with_the_real_processes(number: int)
 def test_every_claim_about_general_systems_names_tests_that_exist() -> None:
     section = PAGE.partition("## General systems")[2].partition("\n## ")[0]
     named = set(re.findall(r"`(\w+_\w+_\w+)`", section))
-    assert len(named) == 7
+    assert len(named) == 8
     assert named <= CPP_TESTS.keys() | PYTHON_TESTS.keys()
