@@ -29,6 +29,7 @@ from quasilpv.scenarios.registry import tracking_experiment
 from quasilpv.synthesis import DesignRequest, default_controller, synthesise
 from quasilpv.synthesis.elastic import torque_controlled
 from quasilpv.synthesis.elastic.arms import links_of
+from quasilpv.synthesis.tracking_design import TrackingDesign
 from reference.elastic_robots import elastic_ur5
 
 T = 1e-3
@@ -41,8 +42,13 @@ def few_postures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @cache
+def design() -> TrackingDesign:
+    return synthesise(DesignRequest.of(ROBOT, default_controller(ROBOT)))
+
+
+@cache
 def designed() -> Artifact:
-    return checked_artifact(synthesise(DesignRequest.of(ROBOT, default_controller(ROBOT))))
+    return checked_artifact(design())
 
 
 @cache
@@ -188,8 +194,7 @@ def test_when_a_torque_loop_lags_by_more_than_its_damping_bears_expect_it_to_swi
 def test_when_torque_loops_lag_too_much_expect_the_design_refused_with_the_lag_they_bear(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    found = synthesise(DesignRequest.of(ROBOT, "dob-acceleration"))
-    known = replace(found, report={"inertia_scale": found.report["inertia_scale"]})
+    known = replace(design(), report={"inertia_scale": design().report["inertia_scale"]})
     monkeypatch.setattr(torque_controlled, "POSTURES", 2)
     monkeypatch.setattr(torque_controlled, "tree_acceleration_law", lambda *_, **__: known)
     monkeypatch.setattr(torque_controlled, "_with_least_inertia", lambda design, *_: design)
