@@ -64,6 +64,16 @@ def test_the_recipe_of_conda_asks_for_what_the_package_asks_for() -> None:
     assert recipe["build"]["entry_points"] == [f"design = {project['project']['scripts']['design']}"]
     assert recipe["about"]["license"] == project["project"]["license"]
     assert set(recipe) == {"package", "source", "build", "requirements", "test", "about"}
+    assert recipe["source"] == {"git_url": "../.."}  # not the path: build trees and environments lie in the folder
+
+
+def test_the_recipe_of_lcm_makes_what_the_other_one_asks_for() -> None:
+    text = (ROOT / "packaging/conda/lcm/meta.yaml").read_text(encoding="utf-8")
+    recipe = yaml.safe_load(re.sub(r"  # \[.*\]$", "", text, flags=re.MULTILINE))
+    assert recipe["source"]["git_rev"] == f"v{recipe['package']['version']}"
+    host = (ROOT / "packaging/conda/meta.yaml").read_text(encoding="utf-8").partition("host:")[2].partition("run:")[0]
+    assert f"    - {recipe['package']['name']}\n" in host
+    assert "pin_subpackage('lcm'" in recipe["build"]["run_exports"][0]  # the executables link it
 
 
 def test_the_dockerfile_builds_with_the_script_of_the_wheels_and_runs_as_nobody_special() -> None:
