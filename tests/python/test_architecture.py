@@ -15,7 +15,7 @@ PACKAGE = ROOT / "python" / "design" / "quasilpv"
 # Every room of the package, lowest layer first. A room imports itself and the layers below its own.
 LAYERS = (
     {"", "arrays", "defaults", "errors", "progress", "shown"},
-    {"extras", "files"},
+    {"arguments", "extras", "files"},
     {"documents"},
     {"systems"},
     {"polytopes"},

@@ -117,6 +117,14 @@ def test_when_a_flipped_artifact_is_given_to_a_real_process_expect_one_line_and_
     assert_refused(outcome, "flipped.json")
 
 
+@pytest.mark.parametrize(("verb", "scenario"), [("track", "stabilise-arm2"), ("hil", "stabilise-arm2")])
+def test_when_the_artifact_is_of_another_robot_expect_both_named(
+    design: Design, tmp_path: Path, artifact: bytes, verb: str, scenario: str
+) -> None:
+    (tmp_path / "arm3.json").write_bytes(artifact)
+    assert_refused(design(verb, scenario, "--artifact", "arm3.json"), "robot.id: got arm3, expected arm2")
+
+
 def singular(document: dict[str, Any]) -> dict[str, Any]:
     for block in document["law"]["inertia"]["blocks"]:
         block["vertices"] = [[[0.0] * 3] * 3 for _ in block["vertices"]]

@@ -131,7 +131,7 @@ def test_numbers_in_text_are_exact_and_doubles_the_rationals_they_are() -> None:
         ({"domain": {sp.Symbol("x", positive=True): (-1, 1), P: (1, 2)}}, r"because the symbol says positive"),
         ({"outputs": ["x", "u"]}, r"toy: output 2: column 1: got u"),
         ({"outputs": ["1 + x"]}, r"toy: output 1: value at x = 0: got 1"),
-        ({"equilibrium": 3}, r"toy: equilibrium: got 3"),
+        ({"equilibrium": 3}, r"equilibrium: got 3"),
         ({"equilibrium": ([0], [0])}, r"equilibrium x0: got 1 values, expected 2"),
         ({"equilibrium": ({"y": 0}, {})}, r"equilibrium x0: got y, expected one of x, v"),
         ({"equilibrium": ({"x": nan}, {})}, r"equilibrium x0, x: got nan, expected a finite number"),

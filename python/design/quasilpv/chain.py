@@ -27,6 +27,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from quasilpv import certificate
+from quasilpv.arguments import checked
 from quasilpv.artifact import Artifact, read_artifact
 from quasilpv.certificate import Evidence, Gate, Verification
 from quasilpv.documents.canonical import parse_document, parse_strict_json
@@ -247,6 +248,7 @@ class Simulation:
         )
 
 
+@checked
 def design(
     robot: AnyRobot | str,
     law: str = DEFAULT_CONTROLLER,
@@ -286,6 +288,7 @@ def design(
     return Design(synthesise(DesignRequest(source, law, wanted, disturbance_compensation)))
 
 
+@checked
 def verify(artifact: ArtifactLike) -> Verification:
     """Check every inequality an artifact claims, from the artifact alone.
 
@@ -304,6 +307,7 @@ def verify(artifact: ArtifactLike) -> Verification:
     return certificate.verify(content, source)
 
 
+@checked
 def gate(artifact: ArtifactLike, *, delay_samples: float | None = None) -> GateResult:
     """Ask whether the frozen loop of an artifact is stable in every posture, with every payload and small delay.
 
@@ -328,6 +332,7 @@ def gate(artifact: ArtifactLike, *, delay_samples: float | None = None) -> GateR
     return GateResult(content["name"], certificate.gate(content, source, exact))
 
 
+@checked
 def simulate(
     artifact: ArtifactLike,
     reference: Reference,

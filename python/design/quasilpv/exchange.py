@@ -17,6 +17,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from quasilpv.arguments import checked
 from quasilpv.artifact import Artifact
 from quasilpv.certificate.exact.vertex_tables import VertexTable
 from quasilpv.documents.system_artifact import SystemArtifactDocument
@@ -32,6 +33,7 @@ Arrays: TypeAlias = dict[str, Any]
 FORMATS = ("npz", "mat", "json")
 
 
+@checked
 def export(what: Exportable, path: Path | str, form: str | None = None) -> Path:
     """Write the gains of a law or an artifact, and the model where there is one, for other tools.
 
@@ -77,6 +79,7 @@ def arrays_of(what: Exportable) -> Arrays:
     return _of_system(what.artifact if isinstance(what, SystemController) else what)
 
 
+@checked
 def state_space(
     what: SystemController | SystemArtifactDocument, premises: Mapping[str, float], *, closed: bool = False
 ) -> Any:

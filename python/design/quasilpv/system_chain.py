@@ -24,6 +24,7 @@ from typing import Any, TypedDict, Unpack
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from quasilpv.arguments import checked
 from quasilpv.artifact.system_store import read_system_artifact, system_summary, write_system_artifact
 from quasilpv.certificate import Verification
 from quasilpv.certificate.systems import verify_system
@@ -119,6 +120,7 @@ class SystemController:
         """Every claim again, from the artifact alone."""
         return verify_system(self.artifact, self.artifact.name)
 
+    @checked
     def simulate(
         self,
         start: Mapping[str, float] | None = None,
@@ -192,6 +194,7 @@ class SystemController:
         return html_table(found["name"], {name: _shown(found[key]) for key, name in names.items()})
 
 
+@checked
 def stabilise(system: SystemLike, **options: Unpack[StabiliseOptions]) -> SystemController:
     """A feedback for a general system, with the region inside its domain that no solution leaves.
 
@@ -226,6 +229,7 @@ def stabilise(system: SystemLike, **options: Unpack[StabiliseOptions]) -> System
     return SystemController(release_system(request, allow_unproved_rate=options.get("allow_unproved_rate", False)))
 
 
+@checked
 def controller(path: Path | str) -> SystemController:
     """A controller from the file of its artifact, either twin.
 

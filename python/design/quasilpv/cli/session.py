@@ -12,7 +12,7 @@ from quasilpv.cli.options import designed, sensors_of
 from quasilpv.defaults import DEFAULT_FORMATS
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.setup import PlantKind, RunSetup
-from quasilpv.experiments.track import disturbance_beyond_limits, start_outside_domain, track
+from quasilpv.experiments.track import disturbance_beyond_limits, require_fit, start_outside_domain, track
 from quasilpv.figures.gallery import write_comparison, write_gallery
 from quasilpv.files import claim_folder
 from quasilpv.scenarios import TrackingExperiment
@@ -53,6 +53,7 @@ class Session:
     def run(self, experiment: TrackingExperiment, variant: Variant, steps: Steps) -> TrackResult:
         """Design, if no controller is given, and run one variant in closed loop."""
         controller = self.controller(experiment, variant, steps)
+        require_fit(experiment, controller)
         for doubt in (disturbance_beyond_limits, start_outside_domain):
             if found := doubt(experiment, controller):
                 print_note(f"warning: {experiment.name}, {variant.label}: {found}")

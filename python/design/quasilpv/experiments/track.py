@@ -97,10 +97,7 @@ def write_run_files(folder: Path, setup: RunSetup) -> RunFiles:
             the controller is proved for, or the folder cannot be written.
     """
     experiment, artifact = setup.experiment, setup.artifact
-    if artifact.robot.id != experiment.robot.id:
-        raise InputError(
-            artifact.name, "robot.id", artifact.robot.id, f"{experiment.robot.id}, which {experiment.name} is for"
-        )
+    require_fit(experiment, artifact)
     if experiment.trajectory.duration_s < artifact.sample_period_s:
         got, expected = (
             f"{experiment.trajectory.duration_s:g} s",
@@ -123,6 +120,13 @@ def write_run_files(folder: Path, setup: RunSetup) -> RunFiles:
         trajectory=write_trajectory(folder / TRAJECTORY_NAME, experiment.trajectory),
         scenario=write_scenario(folder / SCENARIO_NAME, scenario),
     )
+
+
+def require_fit(experiment: TrackingExperiment, artifact: Artifact) -> None:
+    """Raise InputError for a controller of another robot than that of the experiment."""
+    if artifact.robot.id != experiment.robot.id:
+        expected = f"{experiment.robot.id}, which {experiment.name} is for"
+        raise InputError(artifact.name, "robot.id", artifact.robot.id, expected)
 
 
 def _require_motion_limits(artifact: Artifact, experiment: TrackingExperiment) -> None:

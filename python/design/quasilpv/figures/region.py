@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+from quasilpv.arguments import checked
 from quasilpv.figures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, one_plot, style
 from quasilpv.studies.answer import Evidence, Verdict
 from quasilpv.studies.question import Question
@@ -23,6 +24,7 @@ PROVED_LOOK = {"facecolor": SKY, "edgecolor": BLUE, "alpha": 0.6}
 UNDECIDED_LOOK = {"facecolor": "none", "edgecolor": ORANGE, "hatch": "/////"}
 
 
+@checked
 def plot_region(*maps: Region, title: str | None = None, ax: Axes | None = None) -> Figure:
     """One map of `quasilpv.region`, or several over the same axes; see `region_figure`.
 

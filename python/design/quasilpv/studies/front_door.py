@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, TypedDict, Unpack
 
+from quasilpv.arguments import checked
 from quasilpv.conditions.choices import Form, Slack
 from quasilpv.conditions.condition import Options
 from quasilpv.defaults import RELATIVE_TOLERANCE
@@ -38,6 +39,7 @@ class QuestionOptions(TypedDict, total=False):
     memory_limit_gib: float | None
 
 
+@checked
 def solve(system: SystemLike, condition: str, **options: Unpack[QuestionOptions]) -> Answer:
     """Whether a condition holds for a system, with how sure, why, and the law of the solution.
 
@@ -59,6 +61,7 @@ def solve(system: SystemLike, condition: str, **options: Unpack[QuestionOptions]
     return answered(question(system, condition, **options))
 
 
+@checked
 def boundary(
     system: SystemLike,
     condition: str,
@@ -85,6 +88,7 @@ def boundary(
     return find_boundary(question(system, condition, **options), Interval(*over), tolerance)
 
 
+@checked
 def region(
     system: SystemLike,
     condition: str,

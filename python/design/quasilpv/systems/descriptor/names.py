@@ -10,7 +10,7 @@ from sympy.core.function import AppliedUndef
 
 from quasilpv.errors import InputError
 
-Name: TypeAlias = "str | sp.Symbol | AppliedUndef"
+Name: TypeAlias = str | sp.Symbol | AppliedUndef
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 
 

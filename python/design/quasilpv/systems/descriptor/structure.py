@@ -20,6 +20,7 @@ import sympy as sp
 from numpy.typing import NDArray
 from sympy.polys.matrices import DomainMatrix
 
+from quasilpv.arguments import checked
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.algebraic import follows
 from quasilpv.systems.descriptor.invertible_cells import cells_with_inverse
@@ -108,6 +109,7 @@ class StructureReport:
         return "\n".join(lines + [f"  {title}: {f.standing}; {f.reason}" for title, f in findings.items()])
 
 
+@checked
 def structure_report(system: DescriptorSystem) -> StructureReport:
     """Prove what can be proved of the structure of a system. Nothing here is decided by samples or rounding.
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from quasilpv.arguments import checked
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.affine_system import AffineSystem
 from quasilpv.systems.descriptor.affine_terms import PremiseBasis
@@ -141,6 +142,7 @@ class DescriptorSystem(AffineSystem):
         )
 
     @classmethod
+    @checked
     def from_equations(
         cls,
         equations: str | Sequence[Formula],

@@ -7,6 +7,7 @@ from functools import lru_cache
 from math import pi
 from typing import TypeAlias
 
+from quasilpv.arguments import checked
 from quasilpv.errors import look_up
 from quasilpv.systems.robots.arm_parameters import ActuatorLimits, Link, OperatingDomain, PayloadSet
 from quasilpv.systems.robots.fivebar import RhombicFiveBar
@@ -65,6 +66,7 @@ def all_robots() -> tuple[AnyRobot, ...]:
     return (*robots(), ur5())
 
 
+@checked
 def any_robot(name: str) -> AnyRobot:
     """The robot of that name, in the plane or in space.
 
