@@ -24,6 +24,7 @@ from quasilpv.documents.strict_model import validate
 from quasilpv.documents.system_artifact import ObserverDocument, SystemArtifactDocument
 from quasilpv.errors import ClaimError, InfeasibleError, InputError
 from quasilpv.experiments.processes import Talk
+from quasilpv.experiments.system_grid import grid_check
 from quasilpv.experiments.system_hil import require_identical, run_system_over_lcm
 from quasilpv.experiments.system_run import SystemExperiment, scenario_of, simulate_scenario
 from quasilpv.synthesis.regional.request import RegionalRequest
@@ -403,6 +404,27 @@ def test_a_missing_measurement_holds_the_input_and_what_is_not_measured_is_not_m
 def test_what_cannot_be_measured_or_estimated_is_refused(asked: dict[str, Any], error: type, words: str) -> None:
     with pytest.raises(error, match=words):
         RegionalRequest(OBSERVED["two-tanks"][0](), **asked)
+
+
+def test_outputs_stand_for_the_states_that_they_show() -> None:
+    def tanks(outputs: list[str]) -> DescriptorSystem:
+        return DescriptorSystem.from_equations(
+            ["h1' = -h1 + u", "h2' = h1 - h2"],
+            state="h1 h2",
+            inputs="u",
+            outputs=outputs,
+            domain={"h1": (-1, 1), "h2": (-1, 1)},
+            name="tanks",
+        )
+
+    assert RegionalRequest(tanks(["2*h2"]), measured=("outputs",)).measured == ("h2",)
+    with pytest.raises(InputError, match="output 2 of 2"):
+        RegionalRequest(tanks(["h2", "h1 + h2"]), measured=("outputs",))
+
+
+def test_points_of_the_region_are_checked_with_estimates_that_are_exact() -> None:
+    found = grid_check(observed("two-tanks"), points=40)
+    assert found.passed
 
 
 def test_a_state_that_no_measurement_tells_of_is_named() -> None:

@@ -57,7 +57,8 @@ def check_system(
             print_note("how far intervals of parameters can grow is not said: the error of an observer grows with them")
         print_table(source, ("", ""), rows_of(found), left_columns=2)
         verdict = "V falls from every point" if found.passed else "NOT passed: V does not fall from every point"
-        print(f"{verdict}; sampled, not a proof")
+        estimated = "" if artifact.observer is None else ", and of estimates without error"
+        print(f"{verdict}; sampled, not a proof{estimated}")
     if out is not None:
         from quasilpv.figures.style import save
         from quasilpv.figures.systems import grid_figure

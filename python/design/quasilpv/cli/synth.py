@@ -116,7 +116,8 @@ def synth_command(
         typer.Option(
             "--measured",
             metavar="NAME,...",
-            help="Of a system: the states that the law reads; an observer estimates the others.  [default: all states]",
+            help="Of a system: the states that the law reads, or outputs; an observer estimates the others."
+            "  [default: all states]",
         ),
     ] = None,
     start_estimate: Annotated[

@@ -177,6 +177,7 @@ class _Runs:
         )
         document = scenario_of(self.artifact, experiment, self.source).to_document()
         scenario = _runtime.SystemScenario.parse(canonical_json(document), self.source, self.runtime)
+        scenario.estimate = [start[signal.name] for signal in states[: len(y)]]  # of an observer: no error
         found = _runtime.simulate_system(self.runtime, scenario)
         columns = found["columns"]
         level = level_of(self.artifact, columns["state"])

@@ -15,7 +15,7 @@ from quasilpv.errors import ClaimError, InfeasibleError
 from quasilpv.progress import Progress, no_progress
 from quasilpv.synthesis.regional.feedback import RegionalDesign
 from quasilpv.synthesis.regional.observer import ObserverDesign, SampledSlopes, observer_designs, unseen_modes
-from quasilpv.synthesis.regional.request import RegionalRequest
+from quasilpv.synthesis.regional.request import DEFAULT_RATE_HZ, RegionalRequest
 from quasilpv.system_release.document import artifact_of
 from quasilpv.system_release.search import rates_from, searched
 
@@ -171,7 +171,7 @@ def observed(
         except (InfeasibleError, ClaimError) as error:
             refusal = refusal or error
             continue
-        rate_hz = request.rate_hz or 1.0 / found.design.request.sample_period_s
+        rate_hz = found.design.request.rate_hz or DEFAULT_RATE_HZ
         own = replace(request, system=found.design.request.system, rate_hz=rate_hz)
         observing = Observing(replace(found.design, request=own))
         if observing.missing:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import Literal, TypeAlias, get_args
 
+import numpy as np
+
 from quasilpv.documents.system_artifact import PREMISE_FAULT_S
 from quasilpv.errors import InputError, one_of
 from quasilpv.systems.descriptor.system import DescriptorSystem
@@ -14,6 +16,9 @@ from quasilpv.systems.descriptor.system import DescriptorSystem
 Objective: TypeAlias = Literal["largest-region", "fastest", "least-gain", "least-l2-gain"]
 
 DEFAULT_RATE_HZ = 1000.0
+OUTPUTS = "outputs"
+"""Stands for the states that are outputs, where states are named."""
+
 DEFAULT_SHARE = 0.5
 """Of the half-widths of the domain, that `fastest` and `least-gain` have to cover."""
 
@@ -37,7 +42,8 @@ class RegionalRequest:
         performance: by name of a state or an input, the deviation that counts as 1.
         premise_fault_s: for so long a premise may be outside its box, clamped, before the loop goes into a fault, s; 0:
             at once, None: always.
-        measured: names of the differential states that the law reads; the others are estimated. Empty: it reads all.
+        measured: names of the differential states that the law reads; the others are estimated. Empty: it reads all;
+            ``("outputs",)``: those that are outputs of the system.
         start_estimate: by name of a state that is not measured, its first estimate, with trim; its trim if not named.
 
     Raises:
@@ -88,6 +94,8 @@ class RegionalRequest:
     def _check_measured(self) -> None:
         system, source = self.system, self.system.name
         names = [symbol.name for symbol in system.state[: system.differential]]
+        if tuple(self.measured) == (OUTPUTS,) and OUTPUTS not in names:
+            object.__setattr__(self, "measured", _shown_states(system))
         algebraic = [symbol.name for symbol in system.state[system.differential :]]
         for name in self.measured:
             if name in algebraic:
@@ -167,3 +175,19 @@ class RegionalRequest:
                 raise InputError(self.system.name, f"domain of {symbol}", (low, high), "the trim inside the interval")
             bounds.append(bound)
         return tuple(bounds)
+
+
+def _shown_states(system: DescriptorSystem) -> tuple[str, ...]:
+    """The names of the states that are outputs of a system, in their order.
+
+    Raises:
+        InputError: an output is not a state by itself.
+    """
+    shown = set()
+    for k, row in enumerate(system.C.constant):
+        [*places] = np.flatnonzero(row)
+        if len(places) != 1 or system.C.coefficients[:, k].any():
+            expected = "outputs that are states: name states, or make what is measured one (a change of coordinates)"
+            raise InputError(system.name, "measured", f"output {k + 1} of {len(system.C.constant)}", expected)
+        shown.add(int(places[0]))
+    return tuple(system.state[k].name for k in sorted(shown))
