@@ -14,7 +14,7 @@ from quasilpv import _runtime
 from quasilpv.arrays import FloatArray
 from quasilpv.cli import run
 from quasilpv.documents.canonical import canonical_json
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, PlantError
 from quasilpv.experiments.designs import kept_design
 from quasilpv.experiments.logged import logged_result
 from quasilpv.experiments.mujoco_plant import MujocoPlant
@@ -170,6 +170,18 @@ def test_a_body_mujoco_does_not_take_is_refused_by_name() -> None:
     scenario = scenario_of(massless, MujocoIntegrator(), np.zeros(6))
     with pytest.raises(InputError, match=r"wrist_3.*expected a robot that MuJoCo takes"):
         MujocoPlant(scenario, T)
+
+
+def test_when_the_motion_grows_beyond_numbers_expect_an_error_and_no_motion_from_zero(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """MuJoCo alone would begin anew at zero, and write a file beside the user's."""
+    monkeypatch.chdir(tmp_path)
+    scenario = scenario_of(any_robot("ur5").model, MujocoIntegrator(), np.zeros(6))
+    for torque in (1e30, float("nan")):
+        with pytest.raises(PlantError, match=r"MuJoCo: .* not finite at t = 0\.0\d* s, with steps of 0.00025 s"):
+            by_mujoco(scenario, np.full((20, 6), torque), 4)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_simulator_has_no_mujoco_and_says_who_has() -> None:

@@ -16,12 +16,15 @@ import numpy as np
 
 from quasilpv.arrays import FloatArray
 from quasilpv.documents.plants import RubbingJoint, TreePlant
-from quasilpv.errors import InputError
+from quasilpv.errors import InputError, PlantError
 from quasilpv.scenarios import MujocoIntegrator, Scenario, SineTorque
 from quasilpv.systems.robots.spatial import SpatialInertia
 
 SHORTEST_STEP_S = 1e-9
 """What remains of an interval below this is no step."""
+
+LARGEST = 1e10
+"""No angle, m or rad, and no speed is larger: MuJoCo's own bound (mjMAXVAL)."""
 
 
 class MujocoPlant:
@@ -50,7 +53,11 @@ class MujocoPlant:
         self._external = scenario.external_torque
 
     def advance(self, from_s: float, to_s: float, state: FloatArray, torque: FloatArray) -> FloatArray:
-        """The state (q, w), (2 n,), at ``to_s``, a torque held since ``from_s``: see `_runtime.run_closed_loop`."""
+        """The state (q, w), (2 n,), at ``to_s``, a torque held since ``from_s``: see `_runtime.run_closed_loop`.
+
+        Raises:
+            PlantError: the motion grew beyond numbers: the step is too long, or the loop unstable.
+        """
         data, n = self._data, torque.size
         data.qpos[:], data.qvel[:] = state[:n], state[n:]
         data.qfrc_applied[:] = torque
@@ -59,16 +66,25 @@ class MujocoPlant:
         steps = max(math.ceil((to_s - from_s - SHORTEST_STEP_S) / self._step_s), 1)
         self._model.opt.timestep = (to_s - from_s) / steps
         self._mujoco.mj_step(self._model, data, steps)
-        return np.concatenate([data.qpos, data.qvel])
+        found = np.concatenate([data.qpos, data.qvel])
+        if not (np.abs(found) < LARGEST).all():  # not finite, too
+            raise PlantError(f"MuJoCo: the state is not finite at t = {to_s:g} s, with steps of {self._step_s:g} s")
+        return found
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """While inside, MuJoCo of this process asks this plant for friction and external torques."""
+        """While inside, MuJoCo of this process asks this plant for friction and external torques.
+
+        Its warnings, of states that are not finite, are errors of `advance`; alone it would write them in a file.
+        """
+        warned = self._mujoco.get_mju_user_warning()
+        self._mujoco.set_mju_user_warning(lambda _: None)
         self._mujoco.set_mjcb_passive(self._passive)
         try:
             yield
         finally:
             self._mujoco.set_mjcb_passive(None)
+            self._mujoco.set_mju_user_warning(warned)
 
     def _passive(self, _: Any, data: Any) -> None:
         rubbing = self._coulomb_nm * np.tanh(data.qvel / self._coulomb_speed_rad_s)
@@ -103,7 +119,8 @@ def _compiled(mujoco: Any, plant: TreePlant, source: str) -> Any:
     spec.compiler.degree = False
     spec.option.gravity = plant.gravity_m_s2
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
-    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    # A state that is not finite is an error here; MuJoCo alone would begin anew at zero, and say so in a file.
+    spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_AUTORESET
     body = spec.worldbody
     for joint in plant.chain:
         body = _add(mujoco, body, joint)
