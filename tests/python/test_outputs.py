@@ -83,7 +83,7 @@ CALLS = {
     "robot": Call(("show", "ROBOT"), file=True),
     "demo": Call(
         (),
-        (("cli.synth.write_released", RELEASED), ("cli.track.run_all", []), ("cli.session.draw_results", None)),
+        (("cli.synth.write_released", RELEASED), ("cli.track.run_all", [])),
         folder=True,
         says=False,
     ),
@@ -100,7 +100,7 @@ CALLS = {
     "track": Call(("stabilise-arm2", "--no-figures"), (("cli.track.run_all", []),), folder=True, says=False),
     "animate": Call(
         ("stabilise-arm2",),
-        (("cli.animate._animate", {}), ("cli.session.draw_results", None), ("cli.session.Session.run", None)),
+        (("cli.animate._animate", {}), ("cli.gallery.Gallery", MagicMock()), ("cli.session.Session.run", None)),
         True,
     ),
     "hil": Call(("stabilise-arm2", "--controller", "pid", "--no-log"), folder=True),

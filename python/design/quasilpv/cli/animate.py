@@ -80,8 +80,9 @@ def animate_command(
       design animate serial-square fivebar-spiral --rate-hz 2000
       design animate out/cart_pole/artifact.json --start th=0.2
     """
+    from quasilpv.cli.gallery import Gallery
     from quasilpv.cli.results import print_results
-    from quasilpv.cli.session import Session, draw_results
+    from quasilpv.cli.session import Session
     from quasilpv.experiments.result import Variant
     from quasilpv.scenarios import tracking_experiment
 
@@ -103,17 +104,18 @@ def animate_command(
     session = Session(None, rate_hz, plant_kind(plant, experiments), out, log)
     results: list[TrackResult] = []
     made: list[dict[str, Any]] = []
-    with progress(len(experiments) * (len(variants) + 1)) as steps:
-        for experiment in experiments:
-            pair = []
-            for variant in variants:
-                steps.begin(f"{experiment.name}: {variant.label}")
-                pair.append(session.run(experiment, variant, steps))
-                steps.end()
-            made.append(_animate(session, experiment, pair, steps))
-            results += pair
-    if figures:
-        draw_results(results, out, formats)
+    with Gallery(out, formats if figures else (), len(experiments) * len(variants)) as gallery:
+        with progress(len(experiments) * (len(variants) + 1)) as steps:
+            for experiment in experiments:
+                pair = []
+                for variant in variants:
+                    steps.begin(f"{experiment.name}: {variant.label}")
+                    pair.append(session.run(experiment, variant, steps))
+                    gallery.add(pair[-1])
+                    steps.end()
+                made.append(_animate(session, experiment, pair, steps))
+                results += pair
+        gallery.finish()
     if json:
         print_json(made)
         return 0

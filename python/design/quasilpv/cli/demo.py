@@ -39,8 +39,9 @@ def demo_command(
     Example:
       design demo
     """
+    from quasilpv.cli.gallery import Gallery
     from quasilpv.cli.results import print_results
-    from quasilpv.cli.session import Session, draw_results
+    from quasilpv.cli.session import Session
     from quasilpv.cli.synth import write_released
     from quasilpv.cli.track import default_variants, run_all
     from quasilpv.scenarios import tracking_experiment
@@ -53,8 +54,10 @@ def demo_command(
     released = write_released(requested(robot_named(ROBOT), DEFAULT_CONTROLLER, None, None), out / ROBOT)
     session = Session(None, None, "perturbed", out)
     experiments = [tracking_experiment(name) for name in (*SCENARIOS, *SCENARIOS_IN_SPACE)]
-    results = run_all(session, [(e, default_variants(in_space=e.robot.in_space)) for e in experiments])
-    draw_results(results, out, formats)
+    planned = [(e, default_variants(in_space=e.robot.in_space)) for e in experiments]
+    with Gallery(out, formats, sum(len(variants) for _, variants in planned)) as gallery:
+        results = run_all(session, planned, gallery)
+        gallery.finish()
     if json:
         print_json({**released, "runs": [result.row() for result in results]})
     else:

@@ -1,19 +1,16 @@
-"""Runs of the verbs that track scenarios in this process, and their figures."""
+"""Runs of the verbs that track scenarios in this process."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from quasilpv.artifact import Artifact
-from quasilpv.cli.console import Steps, print_note, progress
+from quasilpv.cli.console import Steps, print_note
 from quasilpv.cli.options import designed, sensors_of
-from quasilpv.defaults import DEFAULT_FORMATS
 from quasilpv.experiments.result import TrackResult, Variant
 from quasilpv.experiments.setup import PlantKind, RunSetup
 from quasilpv.experiments.track import disturbance_beyond_limits, require_fit, start_outside_domain, track
-from quasilpv.figures.gallery import write_comparison, write_gallery
 from quasilpv.files import claim_folder
 from quasilpv.scenarios import TrackingExperiment
 from quasilpv.telemetry import LOG_NAME
@@ -71,17 +68,3 @@ class Session:
         if self.log:
             point_to(self.folder(experiment, variant) / LOG_NAME)
         return result
-
-
-def draw_results(results: Sequence[TrackResult], out: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> None:
-    """Draw every run, and beside each other those of a scenario that has several."""
-    with progress(len(results)) as steps:
-        for result in results:
-            steps.begin(f"figures: {result.title}")
-            write_gallery(result, out / result.scenario / result.variant.slug, formats)
-            steps.end()
-    for scenario in dict.fromkeys(result.scenario for result in results):
-        runs = [result for result in results if result.scenario == scenario]
-        if len(runs) > 1:
-            write_comparison(runs, out / scenario, formats)
-    print_note(f"figures are under {out}")

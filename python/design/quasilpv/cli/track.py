@@ -29,6 +29,7 @@ from quasilpv.synthesis import DEFAULT_CONTROLLER
 
 if TYPE_CHECKING:
     from quasilpv.artifact import Artifact
+    from quasilpv.cli.gallery import Gallery
     from quasilpv.cli.session import Session
     from quasilpv.experiments.result import TrackResult, Variant
     from quasilpv.scenarios import TrackingExperiment
@@ -103,8 +104,9 @@ def track_command(
       design track serial-square serial-circle --controller dob-acceleration
       design track --trajectory path.json --robot fivebar
     """
+    from quasilpv.cli.gallery import Gallery
     from quasilpv.cli.results import print_results, print_warnings
-    from quasilpv.cli.session import Session, draw_results
+    from quasilpv.cli.session import Session
     from quasilpv.scenarios import TrackingExperiment, tracking_experiment
 
     formats = formats_of(figure_formats)
@@ -124,9 +126,10 @@ def track_command(
         for experiment in experiments
     ]
     session = Session(given, rate_hz, plant_kind(plant, experiments), out, log)
-    results = run_all(session, planned)
-    if not json if figures is None else figures:
-        draw_results(results, out, formats)
+    wanted = formats if figures or (figures is None and not json) else ()
+    with Gallery(out, wanted, sum(len(variants) for _, variants in planned)) as gallery:
+        results = run_all(session, planned, gallery)
+        gallery.finish()
     if json:
         print_json([result.row() for result in results])
     else:
@@ -135,7 +138,9 @@ def track_command(
         print_warnings(result)
 
 
-def run_all(session: Session, planned: Sequence[tuple[TrackingExperiment, Sequence[Variant]]]) -> list[TrackResult]:
+def run_all(
+    session: Session, planned: Sequence[tuple[TrackingExperiment, Sequence[Variant]]], gallery: Gallery
+) -> list[TrackResult]:
     """Run experiments, each with its variants; their rows are kept in ``results.json`` of the session's folder."""
     results = []
     with progress(sum(len(variants) for _, variants in planned)) as steps:
@@ -143,6 +148,7 @@ def run_all(session: Session, planned: Sequence[tuple[TrackingExperiment, Sequen
             for variant in variants:
                 steps.begin(f"{experiment.name}: {variant.label}")
                 results.append(session.run(experiment, variant, steps))
+                gallery.add(results[-1])
                 steps.end()
     write_readable_json(session.out / "results.json", [result.row() for result in results])
     return results
