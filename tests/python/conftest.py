@@ -16,6 +16,9 @@ settings.load_profile("quick")
 # The helpers of the tests with real processes hold fixtures and assertions.
 pytest.register_assert_rewrite("command", "two_processes", "reference.logged_run")
 
-# A shell starts what runs in its background deaf to Ctrl-C, and so are then the processes of the tests about it.
+# A shell starts what runs in its background deaf to Ctrl-C, nohup to a hangup, and so are then the processes of the
+# tests about both. A handler, unlike deafness, is not inherited: this process goes on ignoring hangups.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda *_: None)

@@ -205,9 +205,9 @@ def test_when_any_room_a_release_depends_on_changes_expect_kept_designs_to_be_st
     rooms = {room_of(module) for module in loaded_with("quasilpv.release") if module.startswith("quasilpv.")}
     covered = {name.removesuffix(".py") for name in designs._DESIGN_ROOMS}
     assert "certificate" in rooms
-    # Exceptions, progress, how results are shown, what an extra lacks and the version decide no design; the last is a
-    # design input of its own.
-    elsewhere = {"errors", "progress", "shown", "extras"}
+    # Exceptions, progress, how results are shown, what an extra lacks, what the front door refuses and the version
+    # decide no design; the last is a design input of its own.
+    elsewhere = {"arguments", "errors", "progress", "shown", "extras"}
     assert {room for room in rooms if not room.startswith("__")} - elsewhere <= covered
 
 

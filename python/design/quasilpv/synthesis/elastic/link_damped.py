@@ -68,7 +68,7 @@ class LinkKind:
 
 
 DAMPED = LinkKind(
-    "link-damped",
+    LinkDampedLaw.tag(),
     "both",
     (
         LinkGains(30.0, 1200.0, 0.01, 0.8),
