@@ -24,19 +24,9 @@ from quasilpv.studies import Verdict
 
 ROOT = Path(__file__).parents[2]
 TOOLS = ROOT / "tools" / "bench"
-LAYERS = (
-    "step",
-    "plant",
-    pytest.param("lmi", marks=pytest.mark.full),
-    "transport",
-    "premises",
-    "latency",
-    "soak",
-    "model",
-    "certificate",
-    "footprint",
-    pytest.param("systems", marks=pytest.mark.full),
-)
+QUICK_LAYERS = ("step", "plant", "transport", "premises", "latency", "soak")  # which tests below look into, too
+SLOW_LAYERS = ("lmi", "model", "certificate", "footprint", "systems")
+LAYERS = (*QUICK_LAYERS, *(pytest.param(layer, marks=pytest.mark.full) for layer in SLOW_LAYERS))
 
 
 def run_tool(layer: str, *options: str, **environment: str) -> subprocess.CompletedProcess[str]:

@@ -88,7 +88,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("after_s", [0.0, 0.5])
+@pytest.mark.parametrize("after_s", [0.0, pytest.param(0.5, marks=pytest.mark.full)])
 def test_an_interrupt_from_the_terminal_is_heard_by_this_process_alone(tmp_path: Path, after_s: float) -> None:
     program = tmp_path / "program.py"
     program.write_text(INTERRUPTED.format(tests=str(Path(__file__).parent), folder=str(tmp_path / "out")))

@@ -189,6 +189,7 @@ def test_when_the_load_is_unknown_expect_a_tool_error_below_350_um(tmp_path: Pat
     assert followed(elastic_ur5(uncertainty=2.0), tmp_path).metrics.rms_tool_m < 350e-6
 
 
+@pytest.mark.full
 def test_when_encoders_sit_on_both_sides_expect_a_proved_correction_and_200_um(tmp_path: Path) -> None:
     artifact = designed("both")
     assert artifact.law.correction_source == "deflection"
