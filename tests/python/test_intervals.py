@@ -1,5 +1,6 @@
 """Guaranteed ranges: they contain every value, they are tight, and their ends are rounded outward."""
 
+from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from quasilpv.errors import InputError
-from quasilpv.systems.intervals.enclosure import IntervalFunction, _lower, _upper, enclose
+from quasilpv.systems.intervals.enclosure import enclose
+from quasilpv.systems.intervals.interval_function import IntervalFunction, lower, upper
 from quasilpv.systems.intervals.quotients import expm1_quotient, tanh_quotient
 
 x, y, w = sp.symbols("x y w", real=True)
@@ -135,8 +137,8 @@ def test_slopes_of_functions_contain_their_difference_quotients(
     rises = np.diff(np.broadcast_to(values(points), points.shape))
     widths = np.diff(points)
     rounding = 1e-14 * (1 + np.abs(values(points[1:])))
-    assert np.all(rises >= _lower(slope) * widths - rounding)
-    assert np.all(rises <= _upper(slope) * widths + rounding)
+    assert np.all(rises >= lower(slope) * widths - rounding)
+    assert np.all(rises <= upper(slope) * widths + rounding)
 
 
 REALS = (-float("inf"), float("inf"))
@@ -181,3 +183,33 @@ def test_when_no_range_can_be_given_expect_one_line_saying_why(
     with pytest.raises(InputError, match=words) as raised:
         enclose(expression, domain)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "function",
+    [
+        sp.sqrt,
+        sp.log,
+        lambda square: 1 / square,
+        lambda square: square ** sp.Rational(-1, 3),
+        lambda square: sp.asin(1 - square / 10),
+    ],
+    ids=["sqrt", "log", "quotient", "root", "asin"],
+)
+def test_an_argument_that_only_seems_to_leave_where_its_function_is_defined_is_bounded_first(
+    function: Callable[[sp.Expr], sp.Expr], seed: int
+) -> None:
+    """Squares, multiplied out, seem to be negative; with a little taken from them they are, and that is refused."""
+    rng = np.random.default_rng(seed)
+    a, b = (sp.Rational(int(k), 4) for k in rng.integers(1, 5, 2))
+    square = sp.expand((a * x - b * y) ** 2 + (b * x + a * y) ** 2 / 4)
+    domain = {x: (-1.0, 1.0), y: (-1.0, 1.0)}
+    assert IntervalFunction(square, [x, y]).bounds(tuple(domain.values()))[0] < -0.01
+    low, high = enclose(function(square + sp.Rational(1, 100)), domain)
+    at = sp.lambdify([x, y], function(square + sp.Rational(1, 100)), "numpy")
+    values = at(*rng.uniform(-1.0, 1.0, (2, 500)))
+    assert low <= values.min() <= values.max() <= high
+    assert min(at(0.0, 0.0) - low, high - at(0.0, 0.0)) <= 1e-3 * max(1.0, abs(at(0.0, 0.0)))  # where the square is 0
+    with pytest.raises(InputError, match="expected"):
+        enclose(function(square - sp.Rational(1, 100)), domain)

@@ -267,6 +267,6 @@ def test_when_a_file_is_no_document_expect_one_line(folder: Path, content: bytes
 @pytest.mark.full
 def test_worker_processes_resolve_a_relative_reference(folder: Path) -> None:
     question = Question("own.py:oscillator", "I.1")
-    tasks = [Task(question, ("r",), (r,)) for r in (0.3, 0.5)]
+    tasks = [Task(question, ("r",), ((r,),)) for r in (0.3, 0.5)]
     verdicts = [answer.verdict for answer in in_processes(2)(tasks)]
     assert verdicts == [Verdict.FEASIBLE, Verdict.INFEASIBLE]  # a common quadratic function exists for r < 0.39799

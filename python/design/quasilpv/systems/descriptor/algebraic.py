@@ -16,8 +16,9 @@ import sympy as sp
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.system import DescriptorSystem
 from quasilpv.systems.descriptor.vocabulary import exact
-from quasilpv.systems.intervals.enclosure import Box, IntervalFunction, IntervalValue, halves
+from quasilpv.systems.intervals.enclosure import halves
 from quasilpv.systems.intervals.functions import iv
+from quasilpv.systems.intervals.interval_function import Box, IntervalFunction, IntervalValue
 
 _MAX_BOXES = 400
 _MAX_ALGEBRAIC = 4  # determinants are expanded

@@ -19,7 +19,8 @@ from quasilpv.arrays import FloatArray
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.premise import AffineMatrix
 from quasilpv.systems.descriptor.system import DescriptorSystem
-from quasilpv.systems.intervals.enclosure import IntervalFunction, halves
+from quasilpv.systems.intervals.enclosure import halves
+from quasilpv.systems.intervals.interval_function import IntervalFunction
 
 Box = tuple[tuple[float, float], ...]
 

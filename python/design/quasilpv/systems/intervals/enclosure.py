@@ -1,9 +1,9 @@
 """Guaranteed ranges of sympy expressions over a box, by interval arithmetic. Nothing here samples.
 
-Every number is an interval of 80-bit binary floats rounded outward (mpmath). An expression in which every symbol occurs
-once, and no chord, is enclosed without overestimation by its natural interval extension; any other is bounded by branch
-and bound with the natural extension, the mean-value form and monotonicity (first derivatives by forward differentiation
-on intervals).
+An expression in which every symbol occurs once, and no chord, is enclosed without overestimation by its natural
+interval extension; any other is bounded by branch and bound with the natural extension, the mean-value form and
+monotonicity. Where a function is not defined on all that the natural extension of its argument holds, the argument is
+bounded like that first.
 
 Reference: Moore, Kearfott and Cloud (2009), Introduction to Interval Analysis, chapters 5, 6 and 11.
 """
@@ -11,52 +11,28 @@ Reference: Moore, Kearfott and Cloud (2009), Introduction to Interval Analysis, 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Mapping, Sequence
-from fractions import Fraction
-from functools import reduce
+from collections.abc import Mapping, Sequence
 from itertools import count
-from math import inf, isfinite, nextafter
-from operator import mul
-from typing import Any
+from math import isfinite
 
 import sympy as sp
-from mpmath import libmp, mp
 
 from quasilpv.errors import InputError
-from quasilpv.systems.intervals.chords import Chord, Ramp, abs_chord, ramp_chord
-from quasilpv.systems.intervals.elementary import (
-    CONVEX,
-    SMOOTHNESS,
-    arccosine,
-    chord,
-    chord_slopes,
-    power,
-    power_slope,
-    sign,
+from quasilpv.systems.intervals.chords import Chord
+from quasilpv.systems.intervals.elementary import CONVEX
+from quasilpv.systems.intervals.functions import iv
+from quasilpv.systems.intervals.interval_function import (
+    Box,
+    IntervalFunction,
+    IntervalValue,
+    UndefinedError,
+    lower,
+    upper,
 )
-from quasilpv.systems.intervals.functions import (
-    expm1_ratio,
-    expm1_ratio_slope,
-    iv,
-    sinc,
-    sinc_slope,
-    tanh,
-    tanh_ratio,
-    tanh_ratio_slope,
-    tanh_slope,
-)
-from quasilpv.systems.intervals.quotients import expm1_quotient, tanh_quotient
 
 _MAX_BOXES = 2_000  # reached only if the extremum is not isolated
 _MAX_BOXES_WITH_CORNERS = 150  # which often have it on a whole face
-
-_OPERATIONS = (
-    "+, *, a rational power, exp, log, sin, cos, tan, their inverses, sinh, cosh, tanh, sinc, Abs, Max, Min or sign"
-)
-
-Box = tuple[tuple[float, float], ...]
-IntervalValue = Any  # mpmath's interval type carries no annotations
-Rule = Callable[[IntervalValue], IntervalValue]
+_ARGUMENT_TOLERANCE = 1e-3  # of bounds of an argument, which only have to keep clear of where its function ends
 
 
 def enclose(
@@ -93,16 +69,43 @@ def enclose(
     expression, domain = in_one_variable(expression, domain)
     symbols = sorted(expression.free_symbols, key=lambda symbol: symbol.name)
     box = tuple((float(domain[symbol][0]), float(domain[symbol][1])) for symbol in symbols)
-    function = IntervalFunction(expression, symbols)
+    function = _defined(expression, symbols, box)
     whole = function.value(box)
-    if not (isfinite(_lower(whole)) and isfinite(_upper(whole))):
-        raise InputError("expression", str(expression), f"range [{_lower(whole)}, {_upper(whole)}]", "a bounded range")
+    if not (isfinite(lower(whole)) and isfinite(upper(whole))):
+        raise InputError("expression", str(expression), f"range [{lower(whole)}, {upper(whole)}]", "a bounded range")
     bounded = all(isfinite(low) and isfinite(high) for low, high in box)
     if _every_symbol_occurs_once(expression) and not (bounded and any(not _exact(c) for c in expression.atoms(Chord))):
-        return _lower(whole), _upper(whole)
+        return lower(whole), upper(whole)
     minimum = _lower_bound_of_minimum(function, box, tolerance)
-    maximum = -_lower_bound_of_minimum(IntervalFunction(-expression, symbols), box, tolerance)
-    return max(minimum, _lower(whole)) + 0.0, min(maximum, _upper(whole)) + 0.0
+    maximum = -_lower_bound_of_minimum(IntervalFunction(-expression, symbols, function.known), box, tolerance)
+    return max(minimum, lower(whole)) + 0.0, min(maximum, upper(whole)) + 0.0
+
+
+def _defined(expression: sp.Expr, symbols: Sequence[sp.Symbol], box: Box) -> IntervalFunction:
+    """An expression as a function that has a value on the box, although an argument may seem to leave where it has one.
+
+    Raises:
+        UndefinedError: an argument does so, or its bounds could not be told from that.
+    """
+    function, bounded = IntervalFunction(expression, symbols), set[sp.Basic]()
+    while True:
+        try:
+            function.value(box)
+        except UndefinedError as error:
+            if error.part is None or error.part in bounded or not all(isfinite(low + high) for low, high in box):
+                raise
+            bounded.add(error.part)
+            known = {argument: _range(argument, function, box) for argument in error.part.args if argument.free_symbols}
+            function = IntervalFunction(expression, symbols, {**function.known, **known})
+        else:
+            return function
+
+
+def _range(part: sp.Expr, function: IntervalFunction, box: Box) -> IntervalValue:
+    """Bounds of a part of a function over the box."""
+    both = [IntervalFunction(sign * part, function.symbols, function.known) for sign in (1, -1)]
+    low, high = (_lower_bound_of_minimum(each, box, _ARGUMENT_TOLERANCE) for each in both)
+    return iv.mpf([low, -high])
 
 
 def _exact(chord_of_a: Chord) -> bool:
@@ -133,7 +136,7 @@ def in_one_variable(
         node: sp.expand(node).subs(dict.fromkeys(symbols, 0)) + ratio * one
         for node, ratio in zip(nodes, ratios, strict=True)
     }
-    return expression.xreplace(moved), {one: (_lower(range_of_form), _upper(range_of_form))}
+    return expression.xreplace(moved), {one: (lower(range_of_form), upper(range_of_form))}
 
 
 def _affine_nodes(node: sp.Basic, symbols: Sequence[sp.Symbol]) -> list[sp.Expr]:
@@ -158,7 +161,7 @@ def _lower_bound_of_minimum(function: IntervalFunction, box: Box, tolerance: flo
     tie_break = count()
     bound, box, split = _bound_and_shrink(function, box)
     heap = [(bound, next(tie_break), box, split)]
-    reachable = _upper(function.value(_midpoint(box)))
+    reachable = upper(function.value(_midpoint(box)))
     for _ in range(_MAX_BOXES_WITH_CORNERS if function.has_corners else _MAX_BOXES):
         bound, _, box, split = heap[0]
         if reachable - bound <= tolerance * max(1.0, abs(reachable)) or split is None:
@@ -166,7 +169,7 @@ def _lower_bound_of_minimum(function: IntervalFunction, box: Box, tolerance: flo
         heapq.heappop(heap)
         for half in halves(box, split):
             child_bound, child, child_split = _bound_and_shrink(function, half)
-            reachable = min(reachable, _upper(function.value(_midpoint(child))))
+            reachable = min(reachable, upper(function.value(_midpoint(child))))
             heapq.heappush(heap, (max(bound, child_bound), next(tie_break), child, child_split))
     return heap[0][0]
 
@@ -174,7 +177,7 @@ def _lower_bound_of_minimum(function: IntervalFunction, box: Box, tolerance: flo
 def _bound_and_shrink(function: IntervalFunction, box: Box) -> tuple[float, Box, int | None]:
     """Lower bound over the box, the face that holds its minimum, and the axis to split (None: it is a point)."""
     value, gradient = function.value_and_gradient(box)
-    bound = _lower(value)
+    bound = lower(value)
     face = list(box)
     for axis, slope in enumerate(gradient):
         low, high = box[axis]
@@ -185,15 +188,15 @@ def _bound_and_shrink(function: IntervalFunction, box: Box) -> tuple[float, Box,
     shrunk = tuple(face)
     if shrunk != box:
         value, gradient = function.value_and_gradient(shrunk)
-        bound = max(bound, _lower(value))
+        bound = max(bound, lower(value))
     centre = _midpoint(shrunk)
     mean_value = function.value(centre)
     influence = []
     for slope, (low, high), (middle, _) in zip(gradient, shrunk, centre, strict=True):
         offset = slope * (iv.mpf([low, high]) - middle)
         mean_value += offset
-        influence.append(0.0 if low == high else max(_upper(offset.delta), 5e-324))
-    bound = max(bound, _lower(mean_value))
+        influence.append(0.0 if low == high else max(upper(offset.delta), 5e-324))
+    bound = max(bound, lower(mean_value))
     split = max(range(len(box)), key=influence.__getitem__, default=None)
     if split is not None:
         low, high = shrunk[split]
@@ -214,183 +217,3 @@ def halves(box: Box, axis: int) -> tuple[Box, Box]:
         (*box[:axis], (low, middle), *box[axis + 1 :]),
         (*box[:axis], (middle, high), *box[axis + 1 :]),
     )
-
-
-# ---- interval evaluation ---------------------------------------------------------------------------------------------
-
-
-class IntervalFunction:
-    """A sympy expression evaluated on boxes, with its gradient."""
-
-    def __init__(self, expression: sp.Expr, symbols: Sequence[sp.Symbol]) -> None:
-        """Take an expression, and the symbols in the order of the axes of a box."""
-        self._nodes: list[sp.Basic] = list(dict.fromkeys(sp.postorder_traversal(expression)))
-        self._symbols = {symbol: axis for axis, symbol in enumerate(symbols)}
-        self._root = expression
-        self.has_corners = expression.has(abs_chord, ramp_chord, Ramp, sp.Abs, sp.Max, sp.Min, sp.sign)
-        self._constants = {node: _number(node) for node in self._nodes if node.is_number}
-
-    def value(self, box: Box) -> IntervalValue:
-        """A range that holds every value on a box."""
-        return self._evaluate(box, with_gradient=False)[0]
-
-    def bounds(self, box: Box) -> tuple[float, float]:
-        """The same as doubles, rounded outwards."""
-        value = self.value(box)
-        return _lower(value), _upper(value)
-
-    def value_and_gradient(self, box: Box) -> tuple[IntervalValue, list[IntervalValue]]:
-        """Ranges that hold every value and every partial derivative on a box."""
-        return self._evaluate(box, with_gradient=True)
-
-    def _evaluate(self, box: Box, with_gradient: bool) -> tuple[IntervalValue, list[IntervalValue]]:
-        axes = range(len(box) if with_gradient else 0)
-        zero = iv.mpf(0)
-        values: dict[sp.Basic, IntervalValue] = {}
-        slopes: dict[sp.Basic, list[IntervalValue]] = {}
-        for node in self._nodes:
-            if node in self._constants:
-                values[node] = self._constants[node]
-                slopes[node] = [zero for _ in axes]
-            elif node in self._symbols:
-                values[node] = iv.mpf(list(box[self._symbols[node]]))
-                slopes[node] = [iv.mpf(1 if axis == self._symbols[node] else 0) for axis in axes]
-            else:
-                arguments = [values[argument] for argument in node.args]
-                values[node] = _apply(node, arguments)
-                partials = _partials(node, arguments) if with_gradient else []
-                slopes[node] = [
-                    sum((_chained(d, slopes[a][axis]) for d, a in zip(partials, node.args, strict=True)), zero)
-                    for axis in axes
-                ]
-        return values[self._root], slopes[self._root]
-
-
-def _chained(outer: IntervalValue, inner: IntervalValue) -> IntervalValue:
-    """A product of slopes; an unbounded slope times what does not change is 0."""
-    return inner if inner.a == 0 == inner.b else outer * inner
-
-
-def _number(node: sp.Basic) -> IntervalValue:
-    if node is sp.pi:
-        return iv.pi
-    if node is sp.E:
-        return iv.e
-    if isinstance(node, sp.Rational | sp.Float):
-        exact = sp.Rational(node)
-        return iv.mpf(int(exact.p)) / iv.mpf(int(exact.q))
-    return _apply(node, [_number(argument) for argument in node.args])
-
-
-def _apply(node: sp.Basic, arguments: list[IntervalValue]) -> IntervalValue:
-    """The exact range (rounded outward) of one operation over the ranges of its arguments."""
-    if isinstance(node, sp.Add):
-        return sum(arguments, iv.mpf(0))
-    if isinstance(node, sp.Mul):
-        return reduce(mul, arguments)
-    if isinstance(node, sp.Max | sp.Min):
-        choice = max if isinstance(node, sp.Max) else min
-        return iv.mpf([choice(x.a for x in arguments), choice(x.b for x in arguments)])
-    if isinstance(node, Chord):
-        return chord(SMOOTHNESS[node.smoothness], *arguments)
-    value, _ = _rules(node)
-    return value(arguments[0])
-
-
-def _partials(node: sp.Basic, arguments: list[IntervalValue]) -> list[IntervalValue]:
-    """Ranges of the partial derivatives of one operation with respect to its arguments."""
-    if isinstance(node, sp.Add):
-        return [iv.mpf(1)] * len(arguments)
-    if isinstance(node, sp.Mul):
-        return [
-            reduce(mul, arguments[:skipped] + arguments[skipped + 1 :], iv.mpf(1)) for skipped in range(len(arguments))
-        ]
-    if isinstance(node, sp.Max | sp.Min):
-        return [_share(node, arguments, number) for number in range(len(arguments))]
-    if isinstance(node, Chord):
-        return list(chord_slopes(SMOOTHNESS[node.smoothness], *arguments))
-    _, slope = _rules(node)
-    constant_exponent = [iv.mpf(0)] * (len(arguments) - 1)
-    return [slope(arguments[0]), *constant_exponent]
-
-
-def _share(node: sp.Basic, arguments: Sequence[IntervalValue], number: int) -> IntervalValue:
-    """Range of a partial derivative of a maximum or minimum: 1 where the argument alone decides, 0 where it cannot."""
-    others = [x for place, x in enumerate(arguments) if place != number]
-    own = arguments[number]
-    if isinstance(node, sp.Max):
-        decides, cannot = all(own.a > x.b for x in others), any(own.b < x.a for x in others)
-    else:
-        decides, cannot = all(own.b < x.a for x in others), any(own.a > x.b for x in others)
-    return iv.mpf([int(decides), int(not cannot)])
-
-
-def _rules(node: sp.Basic) -> tuple[Rule, Rule]:
-    """Value and slope, as functions of an interval, of an operation of one variable."""
-    if isinstance(node, sp.Pow) and node.exp.is_Integer:
-        n = int(node.exp)
-        return lambda x: _integer_power(x, n, node), lambda x: n * _integer_power(x, n - 1, node)
-    if isinstance(node, sp.Pow) and node.exp == sp.Rational(1, 2):
-        return lambda x: _square_root(x, node), lambda x: _square_root_slope(x, node)
-    if isinstance(node, sp.Pow) and node.exp.is_Rational:
-        fraction = Fraction(int(node.exp.p), int(node.exp.q))
-        return lambda x: power(x, fraction), lambda x: power_slope(x, fraction)
-    if node.func in _UNARY:
-        return _UNARY[node.func]
-    raise InputError("expression", "operation", node, _OPERATIONS)
-
-
-def _integer_power(base: IntervalValue, exponent: int, node: sp.Basic) -> IntervalValue:
-    if exponent >= 0:
-        return base**exponent
-    if base.a <= 0 <= base.b:
-        raise InputError("expression", "division", node, "a denominator that is not 0 on the domain")
-    return 1 / base**-exponent
-
-
-def _square_root(x: IntervalValue, node: sp.Basic) -> IntervalValue:
-    if x.a < 0:
-        raise InputError("expression", "square root", node, "an argument >= 0 on the domain")
-    return iv.sqrt(x)
-
-
-def _square_root_slope(x: IntervalValue, node: sp.Basic) -> IntervalValue:
-    return 1 / (2 * _square_root(x, node)) if x.a > 0 else iv.mpf([0, inf])
-
-
-_UNARY: dict[Any, tuple[Rule, Rule]] = {
-    sp.sin: (iv.sin, iv.cos),
-    sp.cos: (iv.cos, lambda x: -iv.sin(x)),
-    sp.exp: (iv.exp, iv.exp),
-    sp.tanh: (tanh, tanh_slope),
-    sp.sinc: (sinc, sinc_slope),
-    expm1_quotient: (expm1_ratio, expm1_ratio_slope),
-    tanh_quotient: (tanh_ratio, tanh_ratio_slope),
-    **{
-        function: SMOOTHNESS[name][:2]
-        for function, name in {
-            sp.log: "log",
-            sp.tan: "tan",
-            sp.atan: "atan",
-            sp.asin: "asin",
-            sp.sinh: "sinh",
-            sp.cosh: "cosh",
-            sp.Abs: "abs",
-            Ramp: "ramp",
-        }.items()
-    },
-    sp.acos: (arccosine, lambda x: -SMOOTHNESS["asin"].slope(x)),
-    sp.sign: (sign, lambda x: iv.mpf(0) if not x.a <= 0 <= x.b else iv.mpf([0, inf])),
-}
-
-
-def _lower(x: IntervalValue) -> float:
-    """The largest double below the lower end point."""
-    value = float(libmp.to_float(x._mpi_[0], rnd="f"))
-    return nextafter(value, -inf) if mp.mpf(value) > mp.make_mpf(x._mpi_[0]) else value  # gradual underflow
-
-
-def _upper(x: IntervalValue) -> float:
-    """The smallest double above the upper end point."""
-    value = float(libmp.to_float(x._mpi_[1], rnd="c"))
-    return nextafter(value, inf) if mp.mpf(value) < mp.make_mpf(x._mpi_[1]) else value  # gradual underflow
