@@ -59,7 +59,11 @@ class UndefinedError(InputError):
 
 
 class IntervalFunction:
-    """A sympy expression evaluated on boxes, with its gradient."""
+    """A sympy expression evaluated on boxes, with its gradient.
+
+    Raises:
+        UndefinedError: of its methods: a function is not defined on all that the range of its argument holds.
+    """
 
     def __init__(
         self, expression: sp.Expr, symbols: Sequence[sp.Symbol], known: Mapping[sp.Basic, IntervalValue] | None = None
@@ -71,13 +75,13 @@ class IntervalFunction:
             symbols: its symbols.
             known: by part of the expression, a range that it cannot leave on any box that is asked for.
         """
-        self.parts: list[sp.Basic] = list(dict.fromkeys(sp.postorder_traversal(expression)))
+        self._parts: list[sp.Basic] = list(dict.fromkeys(sp.postorder_traversal(expression)))
         self.symbols = tuple(symbols)
         self._axes = {symbol: axis for axis, symbol in enumerate(symbols)}
         self._root = expression
         self.known = known or {}
         self.has_corners = expression.has(abs_chord, ramp_chord, Ramp, sp.Abs, sp.Max, sp.Min, sp.sign)
-        self._constants = {node: _number(node) for node in self.parts if node.is_number}
+        self._constants = {node: _number(node) for node in self._parts if node.is_number}
 
     def value(self, box: Box) -> IntervalValue:
         """A range that holds every value on a box."""
@@ -97,7 +101,7 @@ class IntervalFunction:
         zero = iv.mpf(0)
         values: dict[sp.Basic, IntervalValue] = {}
         slopes: dict[sp.Basic, list[IntervalValue]] = {}
-        for node in self.parts:
+        for node in self._parts:
             if node in self._constants:
                 values[node] = self._constants[node]
                 slopes[node] = [zero for _ in axes]
