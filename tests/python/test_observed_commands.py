@@ -19,6 +19,7 @@ from quasilpv.experiments.processes import Talk
 from quasilpv.experiments.system_grid import grid_check
 from quasilpv.experiments.system_hil import require_identical, run_system_over_lcm
 from quasilpv.experiments.system_run import SystemExperiment, scenario_of, simulate_scenario
+from quasilpv.synthesis.regional.observer import SampledSlopes, unseen_modes
 from quasilpv.synthesis.regional.request import RegionalRequest
 from quasilpv.system_release import release_system
 from quasilpv.systems.descriptor.system import DescriptorSystem
@@ -169,6 +170,26 @@ def test_a_state_that_no_measurement_tells_of_is_named() -> None:
     )
     with pytest.raises(InfeasibleError, match="measure p too"):
         release_system(RegionalRequest(cart, decay_rate=0.3, input_limits={"u": 3.0}, measured=("v",)))
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize(
+    ("measured", "missing"),
+    [("v", "p"), ("pv", ""), ("p", ""), ("a", "p"), ("w", "p"), ("vw", "p"), ("s", "p"), ("ps", "")],
+)
+def test_whether_a_state_is_seen_does_not_depend_on_rounding(measured: str, missing: str, seed: int) -> None:
+    """p' = v, v' = a + s, a' = 0 (a is told, or an integrator), w' = -w + a, s' = -2 s: in changing units, rounded."""
+    rng, names = np.random.default_rng(seed), "pvaws"
+    A = np.array([[0, 1, 0, 0, 0], [0, 0, 1, 0, 1], [0, 0, 0, 0, 0], [0, 0, 1, -1, 0], [0, 0, 0, 0, -2.0]])
+    units = np.diag(10.0 ** rng.uniform(-4, 4, 5))
+    shape = rng.normal(size=(5, 5)) + 5.0 * np.eye(5)
+    region = units @ shape @ shape.T @ units
+    root = np.linalg.cholesky(region)
+    slope = units @ A @ np.linalg.inv(units)
+    slope = root @ (np.linalg.inv(root) @ slope @ root) @ np.linalg.inv(root)  # what rounding makes of it
+    samples = SampledSlopes(region, tuple(name in measured for name in names), slope[None], slope[None], 0.5)
+    found = "".join(names[k] for k in unseen_modes(samples))
+    assert found == missing
 
 
 def test_a_premise_of_an_algebraic_state_is_refused_by_name() -> None:

@@ -23,6 +23,9 @@ SHARE = 0.5
 WORSE = 1.5
 """By so much the cost grows from one rate to the next where no faster one is worth a look."""
 
+UNSEEN = 1e-9
+"""Of the norm of the slope: what a state does less than this, in units of the region, nobody sees."""
+
 BACK_OFF = 0.02
 """Of the optimum, given up for room in which the certificate's enclosures can confirm the inequalities."""
 
@@ -97,19 +100,28 @@ def observer_designs(samples: SampledSlopes, period_s: float, near: float | None
 def unseen_modes(samples: SampledSlopes) -> list[int]:
     """Differential states that take part most in modes at the trim that are not seen and do not decay as asked; none
     if all others can be estimated from what is measured there."""
-    D, q = samples.slopes[0], len(samples.region)
-    C = np.eye(q)[list(samples.measured)]
-    states = []
-    for value in np.linalg.eigvals(D):
-        if value.real < -samples.decay_rate:
-            continue
-        scale = np.linalg.norm(D)
-        test = np.vstack([(value * np.eye(q) - D) / scale, C])
-        _, sizes, right = np.linalg.svd(test)
-        if sizes[-1] < 1e-9:
-            share = np.abs(right[-1]) / np.sqrt(np.diag(samples.region))
-            states.append(int(np.argmax(share)))
-    return sorted(set(states))
+    size = np.sqrt(np.diag(samples.region))  # of every state in the region: its unit here
+    D = samples.slopes[0] * size / size[:, None]
+    unseen = _unseen_subspace(D, np.array(samples.measured))
+    values, vectors = np.linalg.eig(unseen.T @ D @ unseen)
+    kept = [vector for value, vector in zip(values, vectors.T, strict=True) if value.real >= -samples.decay_rate]
+    return sorted({int(np.argmax(np.abs(unseen @ vector))) for vector in kept})
+
+
+def _unseen_subspace(D: FloatArray, measured: npt.NDArray[np.bool_]) -> FloatArray:
+    """Orthonormal columns: the largest subspace that D keeps in what is not measured.
+
+    By subspaces and not by modes: rounding moves multiple eigenvalues by the root of what it moves the matrix by.
+    """
+    space = np.eye(len(D))[:, ~measured]
+    while space.size:
+        leaving = D @ space - space @ (space.T @ D @ space)
+        _, sizes, right = np.linalg.svd(leaving)
+        rank = int((sizes > UNSEEN * np.linalg.norm(D)).sum())
+        if rank == 0:
+            break
+        space = space @ right[rank:].T
+    return np.asarray(space, dtype=np.float64)
 
 
 def _design(samples: SampledSlopes, rate: float, period_s: float) -> ObserverDesign | None:
