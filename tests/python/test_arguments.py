@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import quasilpv as ql
 from quasilpv.arguments import checked
@@ -75,11 +76,13 @@ def doubled(value: float, times: int = 2, mode: Literal["plain", "loud"] = "plai
 
 
 def test_numbers_of_other_libraries_are_numbers() -> None:
-    for value in (1, 1.0, np.float64(1.0), np.int64(1), Fraction(1), np.array(1.0)):
+    numbers: list[Any] = [1, 1.0, np.float64(1.0), np.int64(1), Fraction(1), np.array(1.0), sp.Rational(1)]
+    others: list[Any] = [True, "1", None, float("inf"), np.array([1.0]), sp.Symbol("a"), sp.I, 10**400, 1j]
+    for value in numbers:
         assert doubled(value) == 2.0
-    for value in (True, "1", None, float("inf"), np.array([1.0])):
+    for value in others:
         with pytest.raises(ql.InputError, match=r"doubled: value: got .*, expected a finite number"):
-            doubled(value)  # type: ignore[arg-type]
+            doubled(value)
     with pytest.raises(ql.InputError, match=r"times: got 2.5, expected a whole number"):
         doubled(1.0, 2.5)  # type: ignore[arg-type]
     with pytest.raises(ql.InputError, match="mode: got quiet, expected one of plain, loud"):

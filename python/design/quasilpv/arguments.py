@@ -83,8 +83,12 @@ def _fits(value: object, hint: Any) -> bool:
 def _is_a(value: object, kind: Any) -> bool:
     """Whether a value is of a plain type; numbers of numpy, sympy and fractions are numbers, bools and texts not."""
     if kind is float:
-        number = isinstance(value, SupportsFloat) and not isinstance(value, bool) and getattr(value, "ndim", 0) == 0
-        return number and isfinite(float(value))  # type: ignore[arg-type]
+        if not isinstance(value, SupportsFloat) or isinstance(value, bool) or getattr(value, "ndim", 0) != 0:
+            return False
+        try:
+            return isfinite(float(value))
+        except (TypeError, OverflowError):  # a symbol, a complex number; more than doubles hold
+            return False
     if kind is int:
         return isinstance(value, SupportsIndex) and not isinstance(value, bool) and getattr(value, "ndim", 0) == 0
     if kind is Any or not isinstance(kind, type):
