@@ -14,6 +14,9 @@ from quasilpv.cli.console import print_note, progress
 from quasilpv.experiments.result import TrackResult
 from quasilpv.figures.gallery import write_comparison, write_gallery
 
+MOST_PROCESSES = 4
+"""Each takes memory, and two seconds to begin: more would be idle before the next run has ended."""
+
 
 class Gallery:
     """The figures of every run, and of each scenario with several runs those that show them beside each other.
@@ -72,10 +75,10 @@ class Gallery:
 
 
 def _workers(runs: int) -> ProcessPoolExecutor | None:
-    """As many as there are cores beside this process's own, and no more than runs."""
+    """As many as there are cores beside this process's own, up to `MOST_PROCESSES` and to the runs."""
     import joblib
 
-    spare: int = min(joblib.cpu_count() - 1, runs)
+    spare: int = min(joblib.cpu_count() - 1, runs, MOST_PROCESSES)
     return ProcessPoolExecutor(spare, mp_context=get_context("spawn")) if spare else None
 
 

@@ -106,10 +106,9 @@ class SystemRun:
         own = self.artifact.observer
         if own is None:
             return float(self.level[0])
-        error = np.zeros(self.artifact.model.differential)
-        for k, signal in enumerate(self.artifact.states[: len(error)]):
-            if signal.name not in own.measured:
-                error[k] = self.state[0, k] - self.measured[0, k]
+        first = {name: values[0] for name, values in self.estimation_error.items()}
+        states = self.artifact.states[: self.artifact.model.differential]
+        error = np.array([first.get(signal.name, 0.0) for signal in states])
         size = np.sqrt(error @ np.linalg.solve(np.array(own.lyapunov), error))
         return float((np.sqrt(self.level[0]) + own.weight * size) ** 2)
 
