@@ -1,18 +1,21 @@
 // Laws in the loop with plants whose samples are exact: double integrators behind the design model.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <cmath>
 #include <complex>
 
 #include "control_law_fixture.hpp"
+#include "decompositions.hpp"
 #include "quasilpv/controller.hpp"
 
 namespace quasilpv {
 namespace {
 
 using ::quasilpv::testing::artifact_table;
+using ::quasilpv::testing::eigenvalues;
 using ::quasilpv::testing::has_schedule;
+using ::quasilpv::testing::inverse;
 using ::quasilpv::testing::json_twin;
 using ::quasilpv::testing::kSamplePeriod;
 using ::quasilpv::testing::Sample;
@@ -39,7 +42,7 @@ struct SampledPlant {
       bias += arm.coriolis(angle, speed, speed);
     }
     const Eigen::VectorXd acceleration =
-        arm.inertia(angle).inverse() * (to_vector(torque, arm.joints) - bias) + disturbance;
+        inverse(arm.inertia(angle)) * (to_vector(torque, arm.joints) - bias) + disturbance;
     angle += T * speed + T * T / 2.0 * acceleration;
     speed += T * acceleration;
   }
@@ -73,8 +76,8 @@ std::vector<double> observer_gains(double pole) {
     row = row * A;
   }
   const Eigen::Matrix4d shifted = A - pole * Eigen::Matrix4d::Identity();
-  const Eigen::Vector4d predictor = shifted * shifted * shifted * shifted * observability.inverse().col(3);
-  const Eigen::Vector4d current = A.inverse() * predictor;
+  const Eigen::Vector4d predictor = shifted * shifted * shifted * shifted * inverse(observability).col(3);
+  const Eigen::Vector4d current = inverse(A) * predictor;
   return {current(0), current(1), current(2), current(3)};
 }
 
@@ -101,7 +104,7 @@ Eigen::Matrix3d feedback_loop() {
 }
 
 std::vector<std::complex<double>> feedback_poles() {
-  const Eigen::Vector3cd poles = feedback_loop().eigenvalues();
+  const Eigen::Vector3cd poles = eigenvalues(feedback_loop());
   return {poles(0), poles(1), poles(2)};
 }
 
@@ -257,7 +260,7 @@ TEST(ComputedTorqueLoop, estimates_a_constant_disturbance_with_the_pole_of_its_b
   for (int k = 0; k < 400; ++k) {
     const Eigen::MatrixXd inertia = plant.arm.inertia(plant.angle);
     const StepReport report = controller.step(plant.sample().input(k));
-    const Eigen::VectorXd estimate = inertia.inverse() * to_vector(report.estimated_disturbance, 2);
+    const Eigen::VectorXd estimate = inverse(inertia) * to_vector(report.estimated_disturbance, 2);
     const Eigen::VectorXd expected = (1.0 - std::exp(-50.0 * k * T)) * plant.disturbance;
     ASSERT_LT((estimate - expected).cwiseAbs().maxCoeff(), 1e-9) << "sample " << k;
     plant.advance(report.torque_applied);

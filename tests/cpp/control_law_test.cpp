@@ -25,15 +25,9 @@ using ::quasilpv::testing::Sample;
 using ::quasilpv::testing::TestArm;
 using ::quasilpv::testing::to_joint_array;
 using ::quasilpv::testing::to_vector;
-using ::quasilpv::testing::WrittenOutComputedTorque;
-using ::quasilpv::testing::WrittenOutDelayedFeedback;
-using ::quasilpv::testing::WrittenOutDescriptorFeedback;
+using ::quasilpv::testing::written_out;
 using ::quasilpv::testing::WrittenOutDobAcceleration;
-using ::quasilpv::testing::WrittenOutDobTorque;
-using ::quasilpv::testing::WrittenOutHinfTracking;
 using ::quasilpv::testing::WrittenOutLaw;
-using ::quasilpv::testing::WrittenOutPid;
-using ::quasilpv::testing::WrittenOutStateFeedback;
 
 struct Case {
   std::string kind;
@@ -48,32 +42,6 @@ Json limited_table(const Case& c, double torque_nm, double slew_nm_per_s) {
 }
 
 Controller controller_of(const Json& table) { return Controller(Artifact::parse(json_twin(table), "test")); }
-
-std::unique_ptr<WrittenOutLaw> written_out(const Case& c, const OutputStage& output) {
-  const TestArm arm{c.joints};
-  if (c.kind == "dob-acceleration") {
-    return std::make_unique<WrittenOutDobAcceleration>(arm, output);
-  }
-  if (c.kind == "dob-torque") {
-    return std::make_unique<WrittenOutDobTorque>(arm, output);
-  }
-  if (c.kind == "hinf-tracking") {
-    return std::make_unique<WrittenOutHinfTracking>(arm, output);
-  }
-  if (c.kind == "state-feedback") {
-    return std::make_unique<WrittenOutStateFeedback>(arm, output);
-  }
-  if (c.kind == "descriptor-feedback") {
-    return std::make_unique<WrittenOutDescriptorFeedback>(arm, output);
-  }
-  if (c.kind == "delayed-feedback") {
-    return std::make_unique<WrittenOutDelayedFeedback>(arm, output);
-  }
-  if (c.kind == "pid") {
-    return std::make_unique<WrittenOutPid>(arm, output);
-  }
-  return std::make_unique<WrittenOutComputedTorque>(arm, output, c.kind == "ctc-dob" ? 50.0 : 0.0);
-}
 
 // A random walk near a random walk: some premises leave their box, and torques reach small limits.
 class RandomSamples {
@@ -117,7 +85,7 @@ class EveryLaw : public ::testing::TestWithParam<Case> {
 TEST_P(EveryLaw, equals_its_formulas_on_random_input_with_and_without_limits) {
   for (const auto& [torque, slew] : {std::pair{1e9, 1e15}, std::pair{120.0, 60000.0}}) {
     Controller controller = controller_of(limited_table(GetParam(), torque, slew));
-    const auto law = written_out(GetParam(), {torque, slew * kSamplePeriod});
+    const auto law = written_out(GetParam().kind, {GetParam().joints}, {torque, slew * kSamplePeriod});
     int limited = 0;
     for (int k = 0; k < 500; ++k) {
       const Sample s = sample();

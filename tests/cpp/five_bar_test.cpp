@@ -4,14 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "decompositions.hpp"
 #include "five_bar_fixtures.hpp"
 #include "quasilpv/errors.hpp"
 #include "quasilpv/serial_arm.hpp"
@@ -28,8 +28,11 @@ using Eigen::VectorXd;
 using ::testing::AllOf;
 using testing::derivative_at_zero;
 using ::testing::HasSubstr;
+using testing::inverse;
+using testing::least_eigenvalue;
 using testing::random_five_bar;
 using testing::random_state;
+using testing::solution;
 using testing::thesis_five_bar;
 using testing::Uniform;
 
@@ -75,7 +78,7 @@ TEST(FiveBar, mass_matrix_is_the_derivative_of_the_torque_by_acceleration_and_po
       const Vector4d column = five_bar.inverse_dynamics(phi, Vector4d::Zero(), Vector4d::Unit(j)) - at_rest;
       EXPECT_LT(largest(mass.col(j) - column), 1e-12 * (largest(mass) + largest(at_rest)));
     }
-    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix4d>(mass).eigenvalues()[0], 0.0);
+    EXPECT_GT(least_eigenvalue(mass), 0.0);
   }
 }
 
@@ -180,7 +183,7 @@ TEST(FiveBar, projection_changes_speeds_by_an_impulse_of_the_constraint_only) {
   five_bar.make_consistent(0.0, y, y_dot);
   const Vector4d change = five_bar.mass_matrix(phi) * (y.segment<4>(4) - before);
   const MatrixXd J = five_bar.constraint_jacobian(phi);
-  const VectorXd impulse = J.transpose().fullPivLu().solve(change);
+  const VectorXd impulse = solution(J.transpose(), change);
   EXPECT_GT(largest(change), 1e-3);
   EXPECT_LT(largest(J.transpose() * impulse - change), 1e-12);
 }
@@ -204,9 +207,9 @@ TEST(FiveBar, accelerations_and_multipliers_solve_the_full_kkt_system) {
     right << Vector4d(five_bar.torque()[0], five_bar.torque()[1], 0.0, 0.0) -
                  five_bar.inverse_dynamics(phi, v, Vector4d::Zero()),
         -bias;
-    const VectorXd solution = kkt.fullPivLu().solve(right);
-    EXPECT_LT(largest(y_dot.segment<4>(4) - solution.head<4>()), 1e-8 * (1.0 + largest(solution)));
-    EXPECT_LT(largest(y.tail<2>() - solution.tail<2>()), 1e-8 * (1.0 + largest(solution)));
+    const VectorXd expected = solution(kkt, right);
+    EXPECT_LT(largest(y_dot.segment<4>(4) - expected.head<4>()), 1e-8 * (1.0 + largest(expected)));
+    EXPECT_LT(largest(y.tail<2>() - expected.tail<2>()), 1e-8 * (1.0 + largest(expected)));
   }
 }
 
@@ -229,7 +232,7 @@ TEST(FiveBar, equal_legs_are_a_rhombus_with_the_closed_form_of_two_degrees_of_fr
     const Vector2d velocity_torque = 2.0 * c3 * std::sin(opening) * Vector2d(-w[1] * w[1], w[0] * w[0]);
     const Vector2d gravity = (c1 + c2) * th.array().sin();
     const Vector2d expected =
-        mass.inverse() * (Vector2d(five_bar.torque()[0], five_bar.torque()[1]) - velocity_torque - gravity);
+        inverse(mass) * (Vector2d(five_bar.torque()[0], five_bar.torque()[1]) - velocity_torque - gravity);
     EXPECT_LT(largest(y_dot.segment<2>(4) - expected), 1e-10 * (1.0 + largest(expected)));
   }
 }

@@ -4,12 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <cmath>
 #include <limits>
 #include <memory>
 
 #include "arm_fixtures.hpp"
+#include "decompositions.hpp"
 #include "quasilpv/errors.hpp"
 #include "quasilpv/ida_integrator.hpp"
 #include "quasilpv/rk4_integrator.hpp"
@@ -21,6 +22,8 @@ namespace {
 using Eigen::VectorXd;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using testing::Modes;
+using testing::modes_of;
 using testing::point_pendulum;
 using testing::three_link_arm;
 
@@ -62,10 +65,10 @@ TEST_P(BothIntegrators, each_small_mode_of_the_three_link_arm_swings_at_its_own_
   const double c1 = 113.796, c2 = 60.587541, c3 = 16.4808;
   stiffness << c1 + c2 + c3, c2 + c3, c3, c2 + c3, c2 + c3, c3, c3, c3, c3;
   const Eigen::Matrix3d mass = arm.mass_matrix(VectorXd::Zero(3));
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> modes(stiffness, mass);
+  const Modes modes = modes_of(stiffness, mass);
   for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d shape = modes.eigenvectors().col(i).normalized();
-    const double frequency = std::sqrt(modes.eigenvalues()[i]), amplitude = 1e-4;
+    const Eigen::Vector3d shape = modes.shape.col(i).normalized();
+    const double frequency = std::sqrt(modes.squared_frequency[i]), amplitude = 1e-4;
     const auto integrator = make(arm);
     VectorXd y(6);
     y << amplitude * shape, Eigen::Vector3d::Zero();

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstddef>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "artifact_fixture.hpp"
+#include "decompositions.hpp"
 #include "document/field.hpp"
 #include "quasilpv/tree_plant.hpp"
 
@@ -149,8 +150,7 @@ TEST(KinematicTree, does_not_depend_on_the_frames_in_which_oblique_axes_are_writ
     const KinematicTree oblique = random_tree(5, random);
     KinematicTree straight = oblique;
     for (std::size_t k = 0; k < straight.joints.size(); ++k) {
-      const Eigen::Matrix3d R = Eigen::Quaterniond::FromTwoVectors(kUp, oblique.joints[k].axis)
-                                    .toRotationMatrix();  // its axes in the old ones
+      const Eigen::Matrix3d R = rotation_between(kUp, oblique.joints[k].axis);  // its axes in the old ones
       TreeJoint& joint = straight.joints[k];
       joint.axis = R.transpose() * joint.axis;
       joint.rotation = joint.rotation * R;
@@ -183,7 +183,7 @@ TEST(KinematicTree, has_a_symmetric_positive_definite_inertia_whose_columns_are_
       const TreeVector q = 3.0 * random_vector(n, random);
       const TreeMatrix M = dynamics.inertia(q.data());
       EXPECT_EQ(M, M.transpose());
-      EXPECT_GT(Eigen::SelfAdjointEigenSolver<TreeMatrix>(M).eigenvalues()[0], 0.0);
+      EXPECT_GT(least_eigenvalue(M), 0.0);
       for (int k = 0; k < n; ++k) {
         const TreeVector unit = TreeVector::Unit(n, k);
         TreeVector column(n);

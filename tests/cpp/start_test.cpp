@@ -2,11 +2,12 @@
 // model with held accelerations.
 #include <gtest/gtest.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "decompositions.hpp"
 #include "loop_fixture.hpp"
 #include "not_finite.hpp"
 
@@ -42,7 +43,7 @@ struct DesignPlant {
 
   void advance(const JointArray& torque) {
     const Eigen::VectorXd acceleration =
-        arm.inertia(angle).inverse() * (to_vector(torque, kJoints) - arm.gravity(angle));
+        inverse(arm.inertia(angle)) * (to_vector(torque, kJoints) - arm.gravity(angle));
     angle += T * speed + T * T / 2.0 * acceleration;
     speed += T * acceleration;
   }

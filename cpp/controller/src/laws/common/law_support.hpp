@@ -209,6 +209,18 @@ void integrate_error(const JointVector<N>& error, const JointVector<N>& gain, co
   }
 }
 
+/// What is the same in many laws is compiled once for every number of joints: `template class` stands in one .cpp file,
+/// `extern template class` in the header.
+#define QUASILPV_OF_EVERY_SIZE(instantiation, Law) \
+  instantiation Law<1>;                            \
+  instantiation Law<2>;                            \
+  instantiation Law<3>;                            \
+  instantiation Law<4>;                            \
+  instantiation Law<5>;                            \
+  instantiation Law<6>;                            \
+  instantiation Law<7>;
+static_assert(kMaxJoints == 7);
+
 /// Law<n> for n = settings.joints in 1..kMaxJoints.
 template <template <int> class Law, int N = 1, class Parameters>
 std::unique_ptr<ControlLaw> make_law_of_size(const Parameters& parameters, const LawSettings& settings) {

@@ -21,39 +21,7 @@ struct ObserverParameters : LawParameters {
 template <int N>
 class ObserverLaw : public ControlLaw {
  public:
-  StepReport step(const StepInput& input) noexcept final {
-    StepReport report;
-    report.seq = input.seq;
-    const JointVector<N> measured = from_array<N>(input.angle);
-    const bool valid = input.valid && measured.allFinite();
-    report.flags = valid ? kStepHealthy : kMeasurementInvalid;
-    if (!started_) {
-      if (!valid) {
-        report.torque_applied = limiter_.last_applied();
-        return report;
-      }
-      start(measured);
-    }
-    sense(input);
-    const ReferenceVectors<N> reference = shape(reference_.accept(input.reference, report));
-    const JointVector<N> y = valid ? measured : state_.angle;
-    const ModelSample<N> model = sample_model<N>(model_, y, report);
-    if (valid) {
-      correct(measured, report, state_);
-    }
-    state_.filter(filter_pole_, compensated(y, reference));
-    state_.write_to(report);
-    const Command<N> command = control(state_, model, reference, report);
-    to_array<N>(command.torque, report.torque_commanded);
-    report.flags |= limiter_.apply(report.torque_commanded, input.commanded, report.torque_applied);
-    if (valid) {
-      integrate_error<N>(y - reference.angle, command.integral_gain, report, sample_period_s_, state_.integral_error);
-    }
-    const Motion motion = predict(state_, model, reference, report);
-    state_.advance(sample_period_s_, motion.acceleration, motion.jerk);
-    started_ = state_.is_finite();
-    return report;
-  }
+  StepReport step(const StepInput& input) noexcept final;
 
   void reset() noexcept final {
     started_ = false;
@@ -118,5 +86,7 @@ class ObserverLaw : public ControlLaw {
   JointVector<N> first_speed_ = JointVector<N>::Zero();
   bool started_ = false;
 };
+
+QUASILPV_OF_EVERY_SIZE(extern template class, ObserverLaw)
 
 }  // namespace quasilpv
