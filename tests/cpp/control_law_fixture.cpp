@@ -1,8 +1,9 @@
 #include "control_law_fixture.hpp"
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <vector>
+
+#include "decompositions.hpp"
 
 namespace quasilpv::testing {
 namespace {
@@ -40,7 +41,7 @@ Eigen::VectorXd WrittenOutDobAcceleration::step(const Sample& s) {
   const Eigen::VectorXd commanded = M * a_cmd + G;
   const Eigen::VectorXd applied = output.apply(commanded);
   integrate(s.angle - s.reference, -64000.0, commanded, applied, integral);
-  const Eigen::VectorXd a_app = M.inverse() * (applied - G) + a_d;
+  const Eigen::VectorXd a_app = inverse(M) * (applied - G) + a_d;
   th += T * w + T * T / 2.0 * a_app + T * T * T / 6.0 * j_d;
   w += T * a_app + T * T / 2.0 * j_d;
   a_d += T * j_d;
@@ -71,7 +72,7 @@ struct WrittenOutDobTorque : WrittenOutLaw {
     const Eigen::MatrixXd L = arm.observer(z);
     Eigen::MatrixXd implicit = Eigen::MatrixXd::Identity(4 * n, 4 * n);
     implicit.leftCols(n) += T * L;
-    x = implicit.partialPivLu().solve(x + T * L * s.angle).eval();
+    x = solution(implicit, x + T * L * s.angle);
     disturbance = x.segment(2 * n, n);
     d_f = q * d_f + (1.0 - q) * disturbance;
     Eigen::VectorXd error(3 * n);
@@ -81,11 +82,11 @@ struct WrittenOutDobTorque : WrittenOutLaw {
     integrate(s.angle - s.reference, -1.0, commanded, applied, integral);
     Eigen::MatrixXd A = Eigen::MatrixXd::Zero(4 * n, 4 * n);
     A.block(0, n, n, n).setIdentity();
-    A.block(n, 2 * n, n, n) = M.inverse();
+    A.block(n, 2 * n, n, n) = inverse(M);
     A.block(2 * n, 3 * n, n, n).setIdentity();
     const Eigen::MatrixXd transition =
         Eigen::MatrixXd::Identity(4 * n, 4 * n) + T * A + T * T / 2.0 * A * A + T * T * T / 6.0 * A * A * A;
-    const Eigen::VectorXd acceleration = M.inverse() * (applied - G);
+    const Eigen::VectorXd acceleration = inverse(M) * (applied - G);
     x = (transition * x).eval();
     x.head(n) += T * T / 2.0 * acceleration;
     x.segment(n, n) += T * acceleration;
@@ -113,7 +114,7 @@ struct WrittenOutHinfTracking : WrittenOutVelocityLaw {
     const Eigen::Index n = arm.joints;
     Eigen::MatrixXd E = Eigen::MatrixXd::Identity(3 * n, 3 * n);
     E.block(n, n, n, n) = arm.inertia(s.angle);
-    const Eigen::MatrixXd K = arm.numerator(arm.premises(s.angle)) * E.transpose().inverse() * arm.lyapunov().inverse();
+    const Eigen::MatrixXd K = arm.numerator(arm.premises(s.angle)) * inverse(E.transpose()) * inverse(arm.lyapunov());
     const Eigen::VectorXd e = s.angle - s.reference;
     Eigen::VectorXd state(3 * n);
     state << e, w - s.reference_speed, -integral;
@@ -174,7 +175,7 @@ struct WrittenOutDescriptorFeedback : WrittenOutStabilisingLaw {
     const auto gain = [this](int i) { return arm.state_gain(i); };
     const Eigen::MatrixXd F = weighted(arm.schedule_weights(s.angle, w), gain);
     const Eigen::VectorXd commanded =
-        F * descriptor(s.angle).transpose().inverse() * arm.state_lyapunov(0).inverse() * state(s);
+        F * inverse(descriptor(s.angle).transpose()) * inverse(arm.state_lyapunov(0)) * state(s);
     output.apply(commanded);
     return commanded;
   }
@@ -209,7 +210,7 @@ struct WrittenOutDelayedFeedback : WrittenOutStabilisingLaw {
     };
     const Eigen::MatrixXd P = weighted(varpi, [this](int k) { return arm.state_lyapunov(k); });
     const Eigen::VectorXd commanded =
-        weighted(at(0), numerator) * descriptor(s.angle).transpose().inverse() * P.inverse() * state(s);
+        weighted(at(0), numerator) * inverse(descriptor(s.angle).transpose()) * inverse(P) * state(s);
     output.apply(commanded);
     return commanded;
   }
@@ -256,7 +257,7 @@ struct WrittenOutComputedTorque : WrittenOutLaw {
     const Eigen::VectorXd applied = output.apply(commanded);
     integrate(e, 8000.0, commanded, applied, integral);
     previous_w = w;
-    previous_known = M.inverse() * (applied - bias);
+    previous_known = inverse(M) * (applied - bias);
     return commanded;
   }
 };

@@ -7,10 +7,8 @@ namespace quasilpv::testing {
 
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix);
 
-/// x of A x = b; A need not be square.
+/// x of A x = b, A square and regular.
 Eigen::VectorXd solution(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
-
-Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& matrix);
 
 /// Of a symmetric matrix.
 double least_eigenvalue(const Eigen::MatrixXd& symmetric);
@@ -23,7 +21,7 @@ struct Modes {
 
 Modes modes_of(const Eigen::MatrixXd& stiffness, const Eigen::MatrixXd& mass);
 
-/// A rotation that takes the direction of `from` into that of `to`.
+/// The rotation that takes the direction of `from` into that of `to`, which is not the opposite one, on the short way.
 Eigen::Matrix3d rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 }  // namespace quasilpv::testing

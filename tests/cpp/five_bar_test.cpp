@@ -183,7 +183,7 @@ TEST(FiveBar, projection_changes_speeds_by_an_impulse_of_the_constraint_only) {
   five_bar.make_consistent(0.0, y, y_dot);
   const Vector4d change = five_bar.mass_matrix(phi) * (y.segment<4>(4) - before);
   const MatrixXd J = five_bar.constraint_jacobian(phi);
-  const VectorXd impulse = solution(J.transpose(), change);
+  const VectorXd impulse = solution(J * J.transpose(), J * change);
   EXPECT_GT(largest(change), 1e-3);
   EXPECT_LT(largest(J.transpose() * impulse - change), 1e-12);
 }
