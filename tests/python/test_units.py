@@ -76,9 +76,10 @@ def test_a_verdict_is_the_same_in_random_units(asked: Asked, seed: int) -> None:
 @pytest.mark.full
 @pytest.mark.parametrize("asked", QUESTIONS, ids=str)
 def test_every_verdict_of_the_suite_is_the_same_in_twenty_random_units(asked: Asked) -> None:
-    """Three where one answer takes the better part of a minute."""
+    """Three where one answer takes seconds."""
     assert asked.answer().verdict is asked.expected
     long = asked.condition in ("II.7", "II.8", "III.9") or (asked.condition == "II.5" and asked.system != "ex-II.6")
+    long = long or (asked.condition, asked.system) == ("II.6", "arm3")
     seeds = range(3 if long else 20)
     assert [asked.answer(seed).verdict for seed in seeds] == [asked.expected] * len(seeds)
 

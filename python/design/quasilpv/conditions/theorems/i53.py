@@ -48,6 +48,8 @@ from quasilpv.polytopes import PolytopicModel
 _SINGULAR = 1e10
 """Condition of a P that has no inverse to speak of."""
 _ROUNDING = 1e-6
+_LIFTS = 17
+"""Sizes that are tried for the singular values of P_22, each a quarter of the one before: down to 1e-10."""
 
 
 def inequalities(model: PolytopicModel, options: Options) -> Statement:
@@ -80,7 +82,14 @@ def inequalities(model: PolytopicModel, options: Options) -> Statement:
             return _recovered(model, options, values[P11], value)
         if model.inputs and np.linalg.cond(value) > _SINGULAR:
             gains = np.stack([values[each] for each in M])
-            return _completed(model, options, values[P11], value, gains)
+            kept = _completed(model, options, values[P11], value, gains)
+            if kept is not None:
+                return kept
+            lifted = _lifted(problem, values, P22, float(np.abs(value).max()))
+            if lifted is None:
+                got = "a solution whose Lyapunov matrix P is singular"
+                raise InputError("condition I.53", model.system.name, got, "one that has a law K = M P^-1")
+            values, value = lifted, P.at(lifted).astype(float)
         return Feedback(values[P11], polytopic_gain(model, M, values, np.linalg.inv(value)))
 
     return Statement(problem, feedback, slacks)
@@ -97,12 +106,10 @@ def _recovered(model: PolytopicModel, options: Options, lyapunov: FloatArray, P:
 
 def _completed(
     model: PolytopicModel, options: Options, lyapunov: FloatArray, P: FloatArray, gains: FloatArray
-) -> Feedback:
+) -> Feedback | None:
     """The law of a solution whose P is singular: where B is constant, P sees of ``Z B`` no more than the gains do.
 
-    Raises:
-        InputError: what unknown premises multiply in E, A_12 or A_22 would have to be compensated by gains that know
-            them.
+    None where B is not, or where gains would have to know the unknown premises that enter E, A_12 or A_22.
     """
     if model.constant_input:
         whole = completed(P, model)
@@ -112,8 +119,22 @@ def _completed(
         if np.allclose(kept, kept[shared], rtol=_ROUNDING, atol=_ROUNDING * float(np.abs(kept).max())):
             law = PolytopicGain(model.polytope, kept[shared] @ np.linalg.inv(whole))
             return Feedback(lyapunov, law)
-    got = "a solution whose Lyapunov matrix P is singular"
-    raise InputError("condition I.53", model.system.name, got, "one that has a law K = M P^-1: another representation")
+    return None
+
+
+def _lifted(problem: Problem, values: Values, P22: Variable, largest: float) -> Values | None:
+    """A solution near one whose P_22 is singular: what is strict holds near it too, and is checked exactly.
+
+    The singular values of P_22 become at least as large as the inequalities bear, up to the `largest` entry of P: that
+    keeps the gains ``M P^-1`` small. None where they bear nothing that a law in double can be had from.
+    """
+    left, sizes, right = np.linalg.svd(values[P22])
+    for least in largest * 0.25 ** np.arange(_LIFTS):
+        for sign in (1.0, -1.0):
+            near = {**values, P22: left @ np.diag(np.where(sizes < least, sign * least, sizes)) @ right}
+            if problem.holds_exactly(near):
+                return near
+    return None
 
 
 CONDITION = Condition(
