@@ -26,7 +26,7 @@ import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from quasilpv.arrays import IndexArray
+from quasilpv.arrays import IndexArray, distinct
 from quasilpv.defaults import DEFAULT_MEMORY_GIB, DEFAULT_TIME_S
 from quasilpv.errors import InputError, QuasilpvError
 from quasilpv.lmi.layout import Layout
@@ -106,12 +106,12 @@ def estimate(layout: Layout) -> Size:
     _, rows, starts = layout.columns
     unknowns, lengths = len(layout.kept), np.diff(starts)
     cone_of_row = np.repeat(np.arange(len(sizes)), triangles)
-    pairs = np.unique(np.repeat(np.arange(unknowns), lengths) * len(sizes) + cone_of_row[rows])
+    pairs = distinct(np.repeat(np.arange(unknowns), lengths) * len(sizes) + cone_of_row[rows])
     unknown, cone = np.divmod(pairs, len(sizes))
     group, gone = _merged(triangles, unknown, cone, lengths)
     order = np.bincount(group, weights=triangles)
     left = ~gone[unknown]
-    coupled = np.unique(unknown[left] * len(order) + group[cone[left]]) % len(order)
+    coupled = distinct(unknown[left] * len(order) + group[cone[left]]) % len(order)
     entries = order @ order / 2.0 + order[coupled].sum() + np.count_nonzero(~gone) ** 2 / 2.0
     return Size(layout.unknowns, int(sizes.sum()), 8.0 * FILL * float(entries) / GIB)
 

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
-from quasilpv.arrays import FloatArray, IndexArray
+from quasilpv.arrays import FloatArray, IndexArray, distinct
 from quasilpv.lmi import budget
 from quasilpv.lmi.assembly import unknown_offsets, unpack
 from quasilpv.lmi.exact import is_positive_triangle, over_common_denominator
@@ -188,7 +188,7 @@ def compile_family(
     nodes = lattice(base, steps)
     problem = build(base)
     tables = [_Coefficients.of(member) for member in (problem, *map(build, nodes[1:]))]
-    places = np.unique(np.concatenate([table.places for table in tables]))
+    places = distinct(np.concatenate([table.places for table in tables]))
     denominator = lcm(*(table.denominator for table in tables))
     origin, *others = (table.spread(places, denominator) for table in tables)
     slopes = [row - origin for row in others[: len(names)]]
