@@ -33,7 +33,7 @@ class DescriptorGain {
   /// RT-SAFE (bounded, no allocation, no lock, no throw).
   Gain at(const ModelSample<N>& model, Gain numerator, StepReport& report) const noexcept {
     divide_by_descriptor(model, numerator);
-    const Gain gain = numerator * inverse_lyapunov_;
+    const Gain gain = numerator.lazyProduct(inverse_lyapunov_);
     if (!gain.allFinite()) {
       report.flags |= kModelInvalid;
     }
