@@ -75,6 +75,22 @@ TEST(Program, computes_each_operation_of_signals) {
   EXPECT_EQ(of_signals(R"([["const", 2], ["const", 0], ["log_chord"]])"), 0.5);
   EXPECT_NEAR(of_signals(R"([["const", 2], ["signal", 0], ["log_chord"]])"), (std::log(2.3) - std::log(2.0)) / 0.3,
               1e-15);
+  EXPECT_NEAR(of_signals(R"([["signal", 0], ["signal", 1], ["abs_chord"]])"), (0.4 - 0.3) / -0.7, 1e-15);
+  EXPECT_NEAR(of_signals(R"([["signal", 0], ["signal", 1], ["atan_chord"]])"),
+              (std::atan(0.3 - 0.7) - std::atan(0.3)) / -0.7, 1e-15);
+  EXPECT_NEAR(of_signals(R"([["signal", 0], ["signal", 1], ["asin_chord"]])"),
+              (std::asin(0.3 - 0.7) - std::asin(0.3)) / -0.7, 1e-15);
+  EXPECT_NEAR(of_signals(R"([["signal", 0], ["const", 0.2], ["asin_chord"]])"),
+              (std::asin(0.3 + 0.2) - std::asin(0.3)) / 0.2, 1e-15);
+  EXPECT_EQ(of_signals(R"([["signal", 1], ["const", 0.5], ["abs_chord"]])"), -1.0);
+  EXPECT_EQ(of_signals(R"([["signal", 0], ["const", 0.5], ["abs_chord"]])"), 1.0);
+  EXPECT_EQ(of_signals(R"([["const", 0], ["const", 0], ["abs_chord"]])"), 0.0);
+  EXPECT_EQ(of_signals(R"([["const", 0], ["const", -1e-300], ["abs_chord"]])"), -1.0);
+  EXPECT_EQ(of_signals(R"([["const", 2], ["const", 0], ["atan_chord"]])"), 0.2);
+  EXPECT_EQ(of_signals(R"([["const", 0], ["const", 0], ["asin_chord"]])"), 1.0);
+  // Far below what a difference quotient can tell.
+  EXPECT_NEAR(of_signals(R"([["signal", 0], ["const", 1e-12], ["atan_chord"]])"), 1.0 / 1.09, 1e-12);
+  EXPECT_NEAR(of_signals(R"([["signal", 0], ["const", 1e-12], ["asin_chord"]])"), 1.0 / std::sqrt(0.91), 1e-12);
   EXPECT_TRUE(std::isnan(of_signals(R"([["const", -1], ["log"], ["const", 1], ["min"]])")));
   EXPECT_TRUE(std::isnan(of_signals(R"([["const", 1], ["const", -1], ["log"], ["max"]])")));
   EXPECT_THAT(refusal_of(R"([["angle", 0]])", 1, scope), HasSubstr("operand"));

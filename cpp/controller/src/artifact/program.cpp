@@ -27,6 +27,36 @@ double tanh_quotient(double x) noexcept { return x == 0.0 ? 1.0 : std::tanh(x) /
 // (log(a + w) - log a)/w.
 double log_chord(double a, double w) noexcept { return w == 0.0 ? 1.0 / a : std::log1p(w / a) / w; }
 
+// (|a + w| - |a|)/w; 0, between both slopes, where a and w are 0.
+double abs_chord(double a, double w) noexcept {
+  const double b = a + w;
+  if ((a >= 0.0 && b >= 0.0) && (a > 0.0 || b > 0.0)) {
+    return 1.0;
+  }
+  if ((a <= 0.0 && b <= 0.0) && (a < 0.0 || b < 0.0)) {
+    return -1.0;
+  }
+  return w == 0.0 ? b : (std::abs(b) - std::abs(a)) / w;
+}
+
+// (atan(a + w) - atan a)/w: the angle between (1, a) and (1, a + w).
+double atan_chord(double a, double w) noexcept {
+  return w == 0.0 ? 1.0 / (1.0 + a * a) : std::atan2(w, 1.0 + a * (a + w)) / w;
+}
+
+// (asin b - asin a)/w with b = a + w: an angle by its sine b sqrt(1 - a^2) - a sqrt(1 - b^2), of equal signs multiplied
+// out so that nothing cancels, and its cosine.
+double asin_chord(double a, double w) noexcept {
+  const double b = a + w;
+  const double of_a = std::sqrt((1.0 - a) * (1.0 + a)), of_b = std::sqrt((1.0 - b) * (1.0 + b));
+  if (w == 0.0) {
+    return 1.0 / of_a;
+  }
+  const bool same_sign = std::min(a, b) > 0.0 || std::max(a, b) < 0.0;
+  const double sine = same_sign ? w * ((a + b) / (b * of_a + a * of_b)) : b * of_a - a * of_b;
+  return std::atan2(sine, of_a * of_b + a * b) / w;
+}
+
 // NaN if either is.
 double minimum(double x, double y) noexcept { return x < y || std::isnan(x) ? x : y; }
 double maximum(double x, double y) noexcept { return x > y || std::isnan(x) ? x : y; }
@@ -50,7 +80,7 @@ struct Program::Signature {
 };
 
 const Program::Signature* Program::find_signature(const std::string& name) {
-  static constexpr std::array<Signature, 27> kSignatures = {{
+  static constexpr std::array<Signature, 30> kSignatures = {{
       {"const", Op::kConst, 0, true},
       {"angle", Op::kAngle, 0, true},
       {"speed", Op::kSpeed, 0, true},
@@ -78,6 +108,9 @@ const Program::Signature* Program::find_signature(const std::string& name) {
       {"min", Op::kMin, 2, false},
       {"max", Op::kMax, 2, false},
       {"log_chord", Op::kLogChord, 2, false},
+      {"abs_chord", Op::kAbsChord, 2, false},
+      {"atan_chord", Op::kAtanChord, 2, false},
+      {"asin_chord", Op::kAsinChord, 2, false},
   }};
   const auto* found = std::find_if(kSignatures.begin(), kSignatures.end(),
                                    [&name](const Signature& signature) { return name == signature.name; });
@@ -238,6 +271,18 @@ void Program::evaluate(const ProgramInput& input, double* output) const noexcept
       case Op::kLogChord:
         --next;
         next[-1] = log_chord(next[-1], next[0]);
+        break;
+      case Op::kAbsChord:
+        --next;
+        next[-1] = abs_chord(next[-1], next[0]);
+        break;
+      case Op::kAtanChord:
+        --next;
+        next[-1] = atan_chord(next[-1], next[0]);
+        break;
+      case Op::kAsinChord:
+        --next;
+        next[-1] = asin_chord(next[-1], next[0]);
         break;
     }
   }

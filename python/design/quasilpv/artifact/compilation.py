@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,18 @@ from sympy.core.sorting import default_sort_key
 
 from quasilpv.documents.programs import MAX_LENGTH, MAX_POWER, MAX_STACK, OPERATIONS, Program
 from quasilpv.errors import InputError
-from quasilpv.systems.intervals.chords import Ramp, log_chord
+from quasilpv.systems.intervals.chords import (
+    Ramp,
+    abs_chord,
+    asin_chord,
+    atan_chord,
+    cosh_chord,
+    log_chord,
+    ramp_chord,
+    sinh_chord,
+    tan_chord,
+    tanh_chord,
+)
 from quasilpv.systems.intervals.quotients import expm1_quotient, tanh_quotient
 
 Instruction = tuple[str] | tuple[str, int] | tuple[str, float]
@@ -43,6 +54,25 @@ def compile_program(expressions: Sequence[sympy.Expr], inputs: Mapping[sympy.Sym
         raise InputError("program", "code", error, f"a stack of at most {MAX_STACK} values") from error
 
 
+def _sinh_quotient(x: sympy.Expr) -> sympy.Expr:
+    return sympy.exp(-x) * expm1_quotient(2 * x)
+
+
+_WRITTEN_OUT: Mapping[Any, Callable[..., sympy.Expr]] = {
+    sympy.tan: lambda x: sympy.sin(x) / sympy.cos(x),
+    sympy.sinh: lambda x: x * _sinh_quotient(x),
+    sympy.cosh: lambda x: (sympy.exp(x) + sympy.exp(-x)) / 2,
+    sympy.sign: lambda x: abs_chord(sympy.S.Zero, x),
+    sympy.Heaviside: lambda x, *at_zero: (1 + abs_chord(sympy.S.Zero, x)) / 2,
+    tan_chord: lambda a, w: sympy.sinc(w) / (sympy.cos(a) * sympy.cos(a + w)),
+    sinh_chord: lambda a, w: sympy.cosh(a + w / 2) * _sinh_quotient(w / 2),
+    cosh_chord: lambda a, w: sympy.sinh(a + w / 2) * _sinh_quotient(w / 2),
+    tanh_chord: lambda a, w: tanh_quotient(w) * (1 - sympy.tanh(a) * sympy.tanh(a + w)),
+    ramp_chord: lambda a, w: (1 + abs_chord(a, w)) / 2,
+}
+"""Functions without an operation, in those that have one."""
+
+
 class _Compiler:
     """Emits the postfix code of one expression tree."""
 
@@ -60,6 +90,9 @@ class _Compiler:
         expm1_quotient: "expm1_quotient",
         tanh_quotient: "tanh_quotient",
         log_chord: "log_chord",
+        abs_chord: "abs_chord",
+        atan_chord: "atan_chord",
+        asin_chord: "asin_chord",
     }
     _FOLDED: Mapping[Any, str] = {sympy.Min: "min", sympy.Max: "max"}
     _WITH_CONSTANT: Mapping[Any, tuple[float, str]] = {Ramp: (0.0, "max"), sympy.atan: (1.0, "atan2")}
@@ -90,10 +123,8 @@ class _Compiler:
             number, name = self._WITH_CONSTANT[node.func]
             self.emit(node.args[0])
             self._code.extend([("const", number), (name,)])
-        elif node.func is sympy.tan:
-            self.emit(sympy.sin(node.args[0]))
-            self.emit(sympy.cos(node.args[0]))
-            self._code.append(("div",))
+        elif node.func in _WRITTEN_OUT:
+            self.emit(_WRITTEN_OUT[node.func](*node.args))
         else:
             known = map(str, self._inputs) if node.is_Symbol else OPERATIONS
             raise InputError("program", self._field, node, f"one of {', '.join(known)}")
@@ -143,6 +174,12 @@ class _Compiler:
         elif exponent.is_Integer and int(exponent) <= MAX_POWER:
             self.emit(base)
             self._code.append(("pow_int", int(exponent)))
+        elif exponent.is_Rational and exponent.q == 2 and exponent.p <= MAX_POWER:
+            self.emit(base)
+            self._code.extend([("sqrt",), ("pow_int", exponent.p)])
+        elif exponent.is_number and not exponent.is_Integer:  # of what is not negative
+            self.emit(base)
+            self._code.extend([("log",), ("const", self._number(exponent)), ("mul",), ("exp",)])
         else:
-            expected = f"an integer power of at most {MAX_POWER} in absolute value, or a square root"
+            expected = f"an integer power of at most {MAX_POWER} in absolute value, or one of a number"
             raise InputError("program", self._field, base**exponent, expected)

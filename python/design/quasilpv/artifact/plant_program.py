@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import sympy as sp
@@ -11,14 +12,20 @@ from quasilpv.artifact.compilation import compile_program
 from quasilpv.systems.descriptor.affine_system import AffineSystem
 from quasilpv.systems.descriptor.names import rate
 from quasilpv.systems.descriptor.premise import AffineMatrix
-from quasilpv.systems.intervals.chords import log_chord
+from quasilpv.systems.intervals.algebra import of_functions
+from quasilpv.systems.intervals.chords import CHORDS, as_ramps
 from quasilpv.systems.intervals.quotients import expm1_quotient, tanh_quotient
 
-QUOTIENTS = {
+
+def _chord(function: Callable[[sp.Expr], sp.Expr], a: sp.Expr, w: sp.Expr) -> sp.Expr:
+    return (function(a + w) - function(a)) / w
+
+
+QUOTIENTS: dict[Any, Callable[..., sp.Expr]] = {
     sp.sinc: lambda w: sp.sin(w) / w,
     expm1_quotient: lambda w: (sp.exp(w) - 1) / w,
     tanh_quotient: lambda w: sp.tanh(w) / w,
-    log_chord: lambda a, w: (sp.log(a + w) - sp.log(a)) / w,
+    **{chord: partial(_chord, function) for function, chord in CHORDS.items()},
 }
 """What was left of a function when a state was factored out; times that state it is the function again."""
 
@@ -79,8 +86,10 @@ def _product(number: sp.Float, premise: sp.Expr, factor: sp.Expr) -> sp.Expr:
     plain = premise
     for quotient, explicit in QUOTIENTS.items():
         plain = plain.replace(quotient, explicit)
+    if plain != premise:
+        plain = as_ramps(plain)  # so that what stands in one quotient meets what the other was divided by
     whole = plain * factor
-    whole = whole if _is_defined_at_rest(whole) else sp.cancel(whole) if plain != premise else whole
+    whole = whole if _is_defined_at_rest(whole) else of_functions(sp.cancel, whole) if plain != premise else whole
     return number * (whole if _is_defined_at_rest(whole) else premise * factor)
 
 

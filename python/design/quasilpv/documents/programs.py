@@ -14,9 +14,10 @@ from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from quasilpv.arrays import FloatArray
+from quasilpv.documents.canonical import MAX_SAFE_INTEGER
 from quasilpv.documents.strict_model import LARGEST_NUMBER, FieldError, StrictModel
 from quasilpv.errors import InputError
 
@@ -43,6 +44,35 @@ def log_chord(a: Any, w: Any) -> Any:
     """Return ``(log(a + w) - log a)/w``, ``1/a`` at w = 0; elementwise, any shape."""
     safe = np.where(w == 0.0, 1.0, w)
     return np.where(w == 0.0, 1.0 / a, np.log1p(safe / a) / safe)
+
+
+def abs_chord(a: Any, w: Any) -> Any:
+    """Return ``(|a + w| - |a|)/w``; 0, between both slopes, where a and w are 0."""
+    low, high = np.minimum(a, a + w), np.maximum(a, a + w)
+    across = (np.abs(a + w) - np.abs(a)) / np.where(w == 0.0, 1.0, w)
+    falls = np.where((high <= 0.0) & (low < 0.0), -1.0, across)
+    return np.where((low >= 0.0) & (high > 0.0), 1.0, falls)
+
+
+def atan_chord(a: Any, w: Any) -> Any:
+    """Return ``(atan(a + w) - atan a)/w``, at w = 0 ``1/(1 + a^2)``: the angle between (1, a) and (1, a + w)."""
+    safe = np.where(w == 0.0, 1.0, w)
+    return np.where(w == 0.0, 1.0 / (1.0 + a * a), np.arctan2(safe, 1.0 + a * (a + safe)) / safe)
+
+
+def asin_chord(a: Any, w: Any) -> Any:
+    """Return ``(asin(a + w) - asin a)/w``, at w = 0 ``1/sqrt(1 - a^2)``: an angle by its sine and cosine.
+
+    The sine is ``b sqrt(1 - a^2) - a sqrt(1 - b^2)``, b = a + w; of equal signs it is multiplied out, so that nothing
+    cancels.
+    """
+    b = a + w
+    of_a, of_b = np.sqrt((1.0 - a) * (1.0 + a)), np.sqrt((1.0 - b) * (1.0 + b))
+    safe, mixed = np.where(w == 0.0, 1.0, w), b * of_a + a * of_b
+    sine = np.where(
+        np.sign(a) * np.sign(b) > 0.0, safe * ((a + b) / np.where(mixed == 0.0, 1.0, mixed)), b * of_a - a * of_b
+    )
+    return np.where(w == 0.0, 1.0 / of_a, np.arctan2(sine, of_a * of_b + a * b) / safe)
 
 
 def integer_power(base: Any, exponent: int) -> Any:
@@ -95,6 +125,9 @@ OPERATIONS: Mapping[str, Operation] = {
     "min": Operation(2, None, np.minimum),
     "max": Operation(2, None, np.maximum),
     "log_chord": Operation(2, None, log_chord),
+    "abs_chord": Operation(2, None, abs_chord),
+    "atan_chord": Operation(2, None, atan_chord),
+    "asin_chord": Operation(2, None, asin_chord),
 }
 
 
@@ -111,6 +144,14 @@ class Program(StrictModel):
 
     outputs: int = Field(ge=0, le=MAX_STACK)
     code: tuple[tuple[Any, ...], ...] = Field(max_length=MAX_LENGTH)
+
+    @field_validator("code", mode="before")
+    @classmethod
+    def _doubles(cls, code: Any) -> Any:
+        """JSON writes 5e16 without a point, and its digits need not be those of the double: it is one all the same."""
+        if isinstance(code, list | tuple):
+            return tuple(cls._doubles(part) for part in code)
+        return float(code) if type(code) is int and MAX_SAFE_INTEGER < abs(code) < LARGEST_NUMBER else code
 
     @model_validator(mode="after")
     def _check_code(self) -> Self:

@@ -64,7 +64,7 @@ def validate(model: type[Model], document: object, source: str, tags: Iterable[s
         path = _field_path(first["loc"], frozenset(tags))
         if isinstance(cause, FieldError):
             raise InputError(source, member_path(path, cause.field), cause.got, cause.expected) from error
-        got, expected = _got_and_expected(first["type"], first["msg"], first["input"], first.get("ctx", {}))
+        got, expected = got_and_expected(first["type"], first["msg"], first["input"], first.get("ctx", {}))
         raise InputError(source, path or "document", got, expected) from error
 
 
@@ -78,7 +78,8 @@ def _field_path(location: tuple[int | str, ...], tags: frozenset[str]) -> str:
     return path
 
 
-def _got_and_expected(kind: str, message: str, value: Any, context: dict[str, Any]) -> tuple[str, str]:
+def got_and_expected(kind: str, message: str, value: Any, context: dict[str, Any]) -> tuple[str, str]:
+    """What pydantic found and expected, in our words, from an entry of `ValidationError.errors`."""
     got = _shorten(value)
     plain = got, message.removeprefix("Input should be ").removeprefix("Value should be ")
     in_our_words = {

@@ -20,6 +20,7 @@ from typing import Annotated, Literal
 import sympy as sp
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from quasilpv.documents.strict_model import got_and_expected
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.formula import parse_expression
 from quasilpv.systems.descriptor.names import symbol
@@ -148,7 +149,8 @@ def _read(path: Path, content: bytes) -> SystemDocument:
         first = error.errors(include_url=False)[0]
         field = ".".join(str(part) for part in first["loc"] if part not in {"float", "constrained-str"}) or "document"
         got = "nothing" if first["type"] == "missing" else json.dumps(first["input"])[:60]
-        raise InputError(str(path), field, got, first["msg"]) from None
+        _, expected = got_and_expected(first["type"], first["msg"], first["input"], first.get("ctx", {}))
+        raise InputError(str(path), field, got, expected) from None
     except (ValueError, RecursionError) as error:  # no JSON, no UTF-8, or too deep
         raise InputError(str(path), "document", error, "a JSON document") from None
 

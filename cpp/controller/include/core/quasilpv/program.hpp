@@ -72,7 +72,10 @@ class Program {
     kAtan2,
     kMin,
     kMax,
-    kLogChord
+    kLogChord,
+    kAbsChord,
+    kAtanChord,
+    kAsinChord
   };
 
   struct Instruction {

@@ -8,6 +8,7 @@ from math import inf, isfinite, nextafter
 from flint import arb
 
 from quasilpv.certificate.exact.claims import Claim
+from quasilpv.certificate.exact.program_chords import CHORDS
 from quasilpv.certificate.exact.program_values import Code, program_values
 
 LARGEST_SUBDIVISION = 200_000
@@ -20,7 +21,7 @@ Domain = Mapping[str, Sequence[Sequence[float]]]
 
 _POPS = {
     **dict.fromkeys(("const", "angle", "speed", "signal"), 0),
-    **dict.fromkeys(("add", "sub", "mul", "div", "min", "max", "log_chord"), 2),
+    **dict.fromkeys(("add", "sub", "mul", "div", "atan2", "min", "max", *CHORDS), 2),
 }
 
 

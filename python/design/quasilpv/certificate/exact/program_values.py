@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from flint import arb
 
+from quasilpv.certificate.exact.program_chords import CHORDS
 from quasilpv.certificate.exact.tangents import Tangent, power
 from quasilpv.certificate.exact.trigonometric import Polynomial, UnsupportedError
 
@@ -58,14 +59,6 @@ def _of_two(x: Scalar, y: Scalar, name: str) -> Scalar:
     return low.union(high)
 
 
-def log_chord(a: Scalar, w: Scalar) -> Scalar:
-    """``(log(a + w) - log a)/w``; near w = 0 by the mean value theorem a value of ``1/x`` between a and a + w."""
-    if not isinstance(w, arb):
-        safe = np.where(w == 0.0, 1.0, w)
-        return np.where(w == 0.0, 1.0 / a, np.log1p(safe / a) / safe)
-    return 1 / arb(a).union(a + w) if w.contains(0) else (1 + w / a).log() / w
-
-
 _BINARY: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
     "add": operator.add,
     "sub": operator.sub,
@@ -73,7 +66,8 @@ _BINARY: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
     "div": operator.truediv,
     "min": lambda x, y: _of_two(x, y, "min"),
     "max": lambda x, y: _of_two(x, y, "max"),
-    "log_chord": log_chord,
+    **CHORDS,
+    "atan2": lambda y, x: arb.atan2(y, arb(x)) if isinstance(y, arb) else np.arctan2(y, x),
 }
 
 
@@ -86,6 +80,15 @@ def _unary(name: str) -> Callable[[Scalar], Scalar]:
     return apply
 
 
+def _arc(name: str) -> Callable[[Scalar], Scalar]:
+    def apply(x: Scalar) -> Scalar:
+        if isinstance(x, Polynomial | Tangent):
+            raise UnsupportedError(f"{name} of an angle or a speed")
+        return getattr(x, name)() if isinstance(x, arb) else getattr(np, f"arc{name[1:]}")(x)
+
+    return apply
+
+
 _UNARY: Mapping[str, Callable[[Scalar], Scalar]] = {
     "neg": operator.neg,
     "sinc": _sinc,
@@ -93,10 +96,11 @@ _UNARY: Mapping[str, Callable[[Scalar], Scalar]] = {
     "expm1_quotient": _quotient("expm1", lambda x: x.exp()),
     "tanh_quotient": _quotient("tanh", lambda x: 1 - x.tanh() ** 2),
     **{name: _unary(name) for name in ("sin", "cos", "exp", "sqrt", "log", "tanh")},
+    **{name: _arc(name) for name in ("asin", "acos")},
 }
 
 
-_WITHOUT_SLOPE = frozenset({"min", "max", "log_chord", "sinc", "expm1_quotient", "tanh_quotient"})
+_WITHOUT_SLOPE = frozenset({"min", "max", "atan2", *CHORDS, "sinc", "expm1_quotient", "tanh_quotient"})
 """Operations whose slope is not built."""
 
 
@@ -112,7 +116,7 @@ def program_values(
         signal: instead of these, values by number.
 
     Raises:
-        KeyError: an operation that no premise needs (arcs), or a reference.
+        KeyError: a reference, which no premise reads.
         UnsupportedError: of polynomials, what is none; of tangents, what has no slope here.
     """
     inputs = {"angle": angle, "speed": speed, "signal": signal}

@@ -6,7 +6,7 @@ leave over at the point that is taken for the equilibrium: rounding, or it is re
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import sympy as sp
@@ -14,7 +14,9 @@ import sympy as sp
 from quasilpv.errors import InputError
 from quasilpv.systems.descriptor.factoring import expanded, split
 from quasilpv.systems.descriptor.names import rate, symbol
+from quasilpv.systems.descriptor.rest import nearest_rest
 from quasilpv.systems.descriptor.vocabulary import Formula, Vocabulary, exact
+from quasilpv.systems.intervals.chords import without_products_of_signs
 
 __all__ = ["RESIDUAL", "EquationMatrices", "Equilibrium", "equation_matrices", "rate"]
 
@@ -109,7 +111,7 @@ def equation_matrices(
     if len(equations) != len(state):
         raise InputError(source, "equations", f"{len(equations)} equations", f"{len(state)}, one for each state")
     given = [
-        exact(names.read(f"equation {number}", equation, rates=True, inputs=True))
+        without_products_of_signs(exact(names.read(f"equation {number}", equation, rates=True, inputs=True)))
         for number, equation in enumerate(equations, 1)
     ]
     residuals = [equilibrium.of_deviations(equation) for equation in given]
@@ -131,7 +133,7 @@ def equation_matrices(
         constant, entries = split(field, -residuals[row].subs(at_rest), ordered, algebraic)
         drift.append(entries)
         terms = [equilibrium.at(term.subs(dict.fromkeys(rates, 0)), names) for term in expanded(given[row])]
-        constants.append(_left_over(field, constant, terms))
+        constants.append(_left_over(field, constant, terms, lambda: _rest_near(names, given, equilibrium)))
     measured = []
     for number, output in enumerate(outputs, 1):
         whole = exact(names.read(f"output {number}", output))
@@ -151,13 +153,29 @@ def equation_matrices(
     )
 
 
-def _left_over(field: str, constant: sp.Expr, terms: Sequence[sp.Expr]) -> float:
+def _rest_near(names: Vocabulary, equations: Sequence[sp.Expr], equilibrium: Equilibrium) -> str:
+    """In words, where the system rests near the equilibrium it was given; empty without one, or if it rests nowhere."""
+    symbols = (*names.state, *names.inputs)
+    still = [equation.subs(dict.fromkeys([rate(name) for name in names.state], 0)) for equation in equations]
+    if not (equilibrium.state or equilibrium.inputs) or any(e.free_symbols - {*symbols} for e in still):
+        return ""
+    given = {**equilibrium.state, **equilibrium.inputs}
+    rest = nearest_rest(still, symbols, [float(given.get(name, 0)) for name in symbols])
+    if rest is None:
+        return ""
+    return f"; near the one given it rests at {(rest[: len(names.state)], rest[len(names.state) :])}"
+
+
+def _left_over(
+    field: str, constant: sp.Expr, terms: Sequence[sp.Expr], rest_near: Callable[[], str] = lambda: ""
+) -> float:
     """The constant of an equation at the equilibrium if it is rounding, which is reported as a disturbance.
 
     Args:
         field: which equation, for messages.
         constant: what its terms sum to at the equilibrium.
         terms: what they are there.
+        rest_near: where it is 0, for the message.
 
     Raises:
         InputError: it is more than `RESIDUAL` of the row, or depends on a parameter.
@@ -167,7 +185,7 @@ def _left_over(field: str, constant: sp.Expr, terms: Sequence[sp.Expr]) -> float
     size = sum((sp.Abs(sp.N(term)) for term in terms), sp.S.Zero)
     if constant.is_number and size.is_number and abs(sp.N(constant)) <= RESIDUAL * size:
         return float(constant)
-    expected = "0: give the equilibrium, equilibrium=(x0, u0), or make it an input"
+    expected = "0: give the equilibrium, equilibrium=(x0, u0), or make it an input" + rest_near()
     raise InputError(field, "drift at x = 0", sp.N(constant, 6) if constant.is_number else constant, expected)
 
 

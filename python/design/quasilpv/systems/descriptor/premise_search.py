@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from quasilpv.systems.descriptor.affine_terms import ROUNDING, Expansion, expansion, summed
 from quasilpv.systems.descriptor.premise import AffineMatrix, Premise, PremiseKind
+from quasilpv.systems.intervals.algebra import of_functions
 
 Domain = Mapping[sp.Symbol, tuple[float, float]]
 
@@ -109,7 +110,7 @@ def _readable(vector: Expansion) -> sp.Expr:
     """The premise written so that symbols occur seldom, once at best: the sooner its range is found."""
     short = {term: c if c.q < 10**6 else sp.Float(float(c)) for term, c in vector.items()}
     whole = summed(short)
-    return min(sp.factor_terms(whole), sp.factor(whole), key=_symbol_count)
+    return min(sp.factor_terms(whole), of_functions(sp.factor, whole), key=_symbol_count)
 
 
 def _symbol_count(expression: sp.Expr) -> int:

@@ -17,8 +17,7 @@ from sympy.core.function import AppliedUndef
 from quasilpv.errors import InputError, one_of
 from quasilpv.systems.descriptor.formula import parse_equation, split_names
 from quasilpv.systems.descriptor.names import IDENTIFIER, Name, rate, symbol
-from quasilpv.systems.descriptor.open_number import OpenNumber
-from quasilpv.systems.descriptor.open_parameters import open_parameters
+from quasilpv.systems.descriptor.open_parameters import OpenNumber, open_parameters
 
 Formula: TypeAlias = "str | sp.Expr | sp.Eq | float"
 SymbolicMatrix: TypeAlias = "sp.Matrix | Sequence[Sequence[Formula]]"

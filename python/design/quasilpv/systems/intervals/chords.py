@@ -30,9 +30,40 @@ class Ramp(sp.Function):  # type: ignore[misc]  # sympy carries no annotations
             return w
         return sp.S.Zero if w.is_nonpositive else None
 
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """The slope; at the corner the mean of both."""
+        return (1 + sp.sign(self.args[0])) / 2
+
     @staticmethod
     def _imp_(w: ArrayLike) -> FloatArray:
         return np.asarray(np.maximum(np.asarray(w, dtype=float), 0.0))
+
+
+def as_ramps(expression: sp.Expr) -> sp.Expr:
+    """Maxima and minima as ramps: ``max(v, b) = b + ramp(v - b)``, ``min(v, b) = b - ramp(b - v)``, b the numbers."""
+
+    def written(extremum: sp.Expr) -> sp.Expr:
+        numbers_last = sorted(extremum.args, key=lambda part: not part.free_symbols)
+        first, other = numbers_last[0], written_all(extremum.func(*numbers_last[1:]))
+        return other + Ramp(first - other) if isinstance(extremum, sp.Max) else other - Ramp(other - first)
+
+    def written_all(e: sp.Expr) -> sp.Expr:
+        return e.replace(lambda node: isinstance(node, sp.Max | sp.Min), written)
+
+    return written_all(expression)
+
+
+def without_products_of_signs(expression: sp.Expr) -> sp.Expr:
+    """``w sign(w)`` as ``|w|``, which does not jump."""
+
+    def written(product: sp.Expr) -> sp.Expr:
+        factors = list(product.args)
+        for sign in [factor for factor in factors if isinstance(factor, sp.sign) and factor.args[0] in factors]:
+            factors.remove(sign)
+            factors[factors.index(sign.args[0])] = sp.Abs(sign.args[0])
+        return sp.Mul(*factors)
+
+    return expression.replace(lambda node: node.is_Mul and node.has(sp.sign), written)
 
 
 class Chord(sp.Function):  # type: ignore[misc]
