@@ -128,9 +128,7 @@ def _reported(source: str) -> Iterator[None]:
     """Whatever a user's code raises, in one line with the last line of that file in the traceback."""
     try:
         yield
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
+    except (Exception, SystemExit) as error:  # interrupts and stops are nobody's mistake
         where = _line(source, error)
         if isinstance(error, InputError):
             raise InputError(f"{source}{where}: {error.source}", error.field, error.got, error.expected) from None
