@@ -1,6 +1,9 @@
 """What names a system: the catalogue, a name in a Python file, an entry point of a package."""
 
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -270,3 +273,12 @@ def test_worker_processes_resolve_a_relative_reference(folder: Path) -> None:
     tasks = [Task(question, ("r",), ((r,),)) for r in (0.3, 0.5)]
     verdicts = [answer.verdict for answer in in_processes(2)(tasks)]
     assert verdicts == [Verdict.FEASIBLE, Verdict.INFEASIBLE]  # a common quadratic function exists for r < 0.39799
+
+
+def test_a_stop_while_a_users_code_runs_is_no_error_of_that_code(tmp_path: Path) -> None:
+    code = "import os, signal\n\n\ndef plant():\n    os.kill(os.getpid(), signal.SIGTERM)\n"
+    (tmp_path / "own.py").write_text(code, encoding="utf-8")
+    command = [sys.executable, "-m", "quasilpv", "solve", f"{tmp_path / 'own.py'}:plant", "-c", "I.2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 128 + signal.SIGTERM
+    assert "code that runs" not in done.stderr
