@@ -59,10 +59,10 @@ def system_summary(artifact: SystemArtifactDocument) -> dict[str, Any]:
         + ("" if artifact.observer is None else "; what is not measured is estimated"),
         "sample_period_s": artifact.sample_period_s,
         "decay_rate_per_s": artifact.region.decay_rate_per_s,
-        "states": {signal.name: _interval(signal.low, signal.high, signal.trim) for signal in artifact.states},
-        "inputs": {signal.name: _interval(signal.low, signal.high, signal.trim) for signal in artifact.inputs},
+        "states": {signal.name: f"{_interval(signal)}, trim {signal.trim:.6g}" for signal in artifact.states},
+        "inputs": {signal.name: f"{_interval(signal)}, trim {signal.trim:.6g}" for signal in artifact.inputs},
         "parameters": {
-            signal.name: f"{_interval(signal.low, signal.high, signal.trim)}, {'known' if signal.known else 'unknown'}"
+            signal.name: f"{_interval(signal)}, {'known' if signal.known else 'unknown'}"
             for signal in artifact.parameters
         },
         "region_reach": dict(zip(names, reach, strict=True)),
@@ -116,6 +116,6 @@ def _observer(artifact: SystemArtifactDocument, own: ObserverDocument) -> dict[s
     }
 
 
-def _interval(low: float | None, high: float | None, trim: float) -> str:
-    ends = ("unbounded" if end is None else f"{end + trim:.6g}" for end in (low, high))
-    return f"{' to '.join(ends)}, trim {trim:.6g}"
+def _interval(signal: Any) -> str:
+    ends = (signal.low, signal.high)
+    return " to ".join("unbounded" if end is None else f"{end + signal.trim:.6g}" for end in ends)
