@@ -228,3 +228,19 @@ def test_the_command_says_that_no_proof_is_of_a_disturbed_run(
     assert run(["simulate", str(path), *options, "--disturbance", "u=step:2,0.1"]) == 0
     assert "without disturbance" in capsys.readouterr().err
     assert run(["simulate", str(path), *options, "--disturbance", "w=100"]) == 1
+
+
+def test_a_parameter_beyond_what_is_assumed_and_a_delay_are_said_to_be_beside_the_proof(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    artifact = released("dc-bus")
+    path = str(write_system_artifact(tmp_path, artifact)[0])
+    (P,) = artifact.parameters
+    for value, beyond in ((P.low, []), (P.high, []), (P.high + 1e-3, ["P"]), (P.low - 1.0, ["P"])):
+        assert run(["simulate", path, "--parameter", f"P={value!r}", "--duration", "0.01", "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["beyond_assumed"] == beyond
+        assert run(["simulate", path, "--parameter", f"P={value!r}", "--duration", "0.01"]) == 0
+        assert ("the proof assumes P in" in capsys.readouterr().err) == bool(beyond)
+    for delay_s in (0.0, artifact.sample_period_s):
+        assert run(["simulate", path, "--delay", repr(delay_s), "--duration", "0.01"]) == 0
+        assert ("the proof is without delay" in capsys.readouterr().err) == (delay_s > 0.0)

@@ -185,6 +185,11 @@ def notes_of(run: SystemRun) -> list[str]:
         notes.append("the start is outside the region: nothing is proved of this run")
     elif run.start_level > 1.0:
         notes.append("the estimates start too far from the state: nothing is proved of this run")
+    for name, assumed in run.beyond_assumed.items():
+        value = run.scenario.parameters[name]
+        notes.append(f"the proof assumes {name} in {assumed}: this run with {value:g} is beside it")
+    if run.scenario.delay_s:
+        notes.append(f"the proof is without delay: this run with {run.scenario.delay_s:g} s is beside it")
     if run.scenario.disturbances:
         notes.append("the region is proved without disturbance: this run with one is beside it")
     if not run.scenario.has_exact_sensors:

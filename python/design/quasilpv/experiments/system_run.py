@@ -113,9 +113,26 @@ class SystemRun:
         return float((np.sqrt(self.level[0]) + own.weight * size) ** 2)
 
     @property
+    def beyond_assumed(self) -> dict[str, str]:
+        """Parameters outside what the proof assumes of them, each with that interval in words."""
+        values = self.scenario.parameters
+        return {
+            signal.name: f"{signal.low:g} to {signal.high:g}"
+            for signal in self.artifact.parameters
+            if signal.low is not None
+            and signal.high is not None
+            and not signal.low <= values[signal.name] - signal.trim <= signal.high
+        }
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether it is what proofs are of: `SystemScenario.is_nominal`, no delay, parameters as they are assumed."""
+        return self.scenario.is_nominal and not self.scenario.delay_s and not self.beyond_assumed
+
+    @property
     def stayed(self) -> bool:
         """Whether no state left its domain, and V never exceeded `start_level` or, in what no proof is of, 1."""
-        bound = self.start_level if self.scenario.is_nominal else max(self.start_level, 1.0)
+        bound = self.start_level if self.is_nominal else max(self.start_level, 1.0)
         return self.exit is None and bool(self.level.max() <= max(bound, 1e-300) * (1.0 + 1e-9))
 
     def first_difference(self, other: SystemRun) -> str | None:
@@ -158,6 +175,7 @@ class SystemRun:
                 }
             ),
             "exact_sensors": self.scenario.has_exact_sensors,
+            "beyond_assumed": sorted(self.beyond_assumed),
             "disturbed": sorted({term.signal for term in self.scenario.disturbances}),
             "flags": list(self.flags),
             "left_domain": None if self.exit is None else {"time_s": self.exit[0], "signal": self.exit[1]},
