@@ -202,11 +202,26 @@ def test_no_feedback_is_said_to_exist_where_the_input_is_too_weak() -> None:
     # |u| <= 0.1 holds |x| < about 0.1 / 3: the region shrinks with the input and does not vanish.
     feeble = design_feedback(RegionalRequest(system, input_limits={"u": 0.1}, decay_rate=1.0))
     assert 0.02 < feeble.extent[0] < 0.1 / 3.0
+
+
+@pytest.mark.parametrize(
+    ("drift", "mode"), [("x", "at every point the mode 1"), ("x + x^2", "the mode 1"), ("x*u", "the mode 0")]
+)
+def test_where_no_input_reaches_a_mode_that_is_proved(drift: str, mode: str) -> None:
     unreachable = ql.DescriptorSystem.from_equations(
-        ["x' = x", "v' = u"], state="x v", inputs="u", domain={"x": (-1, 1), "v": (-1, 1)}, name="unreachable"
+        [f"x' = {drift}", "v' = u"], state="x v", inputs="u", domain={"x": (-1, 1), "v": (-1, 1)}, name="unreachable"
     )
-    with pytest.raises(InfeasibleError, match="unreachable: no feedback was found"):
+    with pytest.raises(InfeasibleError, match=rf"unreachable: no feedback has a decay of .*, proved: .*{mode} of x is"):
         release_system(RegionalRequest(unreachable, input_limits={"u": 1.0}))
+
+
+def test_a_mode_that_no_input_reaches_is_in_the_way_of_a_faster_decay_only() -> None:
+    slow = ql.DescriptorSystem.from_equations(
+        ["x' = -x/100", "v' = u"], state="x v", inputs="u", domain={"x": (-1, 1), "v": (-1, 1)}, name="slow"
+    )
+    with pytest.raises(InfeasibleError, match=r"the mode -0\.01 of x"):
+        release_system(RegionalRequest(slow, decay_rate=1.0))
+    assert release_system(RegionalRequest(slow, decay_rate=0.005)).name
 
 
 def test_a_rate_that_is_not_proved_is_refused_with_one_that_would_be() -> None:

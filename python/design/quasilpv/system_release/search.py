@@ -7,9 +7,14 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from math import floor, inf, log10, sqrt
 
+import numpy as np
+
+from quasilpv.conditions.condition import Options
 from quasilpv.errors import ClaimError, InfeasibleError
 from quasilpv.lmi import budget
+from quasilpv.polytopes import polytopic_model
 from quasilpv.progress import Progress
+from quasilpv.studies.refutation import Loop, refutation
 from quasilpv.synthesis.regional.feedback import default_decay_rate, design_feedback
 from quasilpv.synthesis.regional.request import RegionalRequest
 from quasilpv.system_release.sampling import Sampled
@@ -22,6 +27,12 @@ period T needs ``b (b + J) < 2 alpha / T``, about."""
 
 DECAYS = (1.0, 3.0, 10.0)
 """Decay rates that are tried if none is asked for, in units of the default one: more decay allows a longer period."""
+
+LIKE = "I.2"
+"""A condition of which a refutation is one of a feedback of the states, whatever its inequalities."""
+
+REFUTATION_S = 5.0
+"""What looking for a refutation may take."""
 
 FIRST_UNITS = 1
 """In so many units every factoring is tried first."""
@@ -61,7 +72,23 @@ def searched(request: RegionalRequest, allow_unproved_rate: bool, progress: Prog
     except budget.TimeUpError as error:
         raise InfeasibleError(f"{request.system.name}: no feedback was found: {error}") from error
     assert refusal is not None  # a system is a factoring of itself
-    raise refusal
+    refuted = _refuted(request)
+    raise refusal if refuted is None else InfeasibleError(f"{request.system.name}: {refuted}")
+
+
+def _refuted(request: RegionalRequest) -> str | None:
+    """In words, a mode at the trim that no input reaches: there is no feedback then. None if none was found."""
+    system, decay_rate = request.system, request.decay_rate or default_decay_rate(request.system)
+    try:
+        with budget.limited(budget.Limits(time_s=REFUTATION_S)):
+            found = refutation(LIKE, polytopic_model(system, "per-premise"), Options(decay_rate=decay_rate))
+    except budget.TimeUpError:
+        return None
+    if found is None or system.parameters:
+        return None
+    if [value for _, value in found.point] != system.premise_values(np.zeros(system.order)).tolist():
+        return None  # of the equations as they are factored, but not of the system
+    return f"no feedback has a decay of {decay_rate:.4g} 1/s, proved: {found.sentence(Loop.CLOSED)}"
 
 
 class _NotProvedError(ClaimError):
