@@ -85,6 +85,9 @@ TEST(Program, computes_each_operation_of_signals) {
   EXPECT_EQ(of_signals(R"([["signal", 1], ["const", 0.5], ["abs_chord"]])"), -1.0);
   EXPECT_EQ(of_signals(R"([["signal", 0], ["const", 0.5], ["abs_chord"]])"), 1.0);
   EXPECT_EQ(of_signals(R"([["const", 0], ["const", 0], ["abs_chord"]])"), 0.0);
+  EXPECT_EQ(of_signals(R"([["const", 0], ["sinc_slope"]])"), 0.0);
+  EXPECT_NEAR(of_signals(R"([["signal", 0], ["sinc_slope"]])"), (std::cos(0.3) - std::sin(0.3) / 0.3) / 0.3, 1e-14);
+  EXPECT_NEAR(of_signals(R"([["const", 0.0999], ["sinc_slope"]])"), -0.0333 + 0.0999 * 0.0999 * 0.0999 / 30.0, 2e-8);
   EXPECT_EQ(of_signals(R"([["const", 0], ["const", -1e-300], ["abs_chord"]])"), -1.0);
   EXPECT_EQ(of_signals(R"([["const", 2], ["const", 0], ["atan_chord"]])"), 0.2);
   EXPECT_EQ(of_signals(R"([["const", 0], ["const", 0], ["asin_chord"]])"), 1.0);

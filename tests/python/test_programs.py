@@ -208,7 +208,7 @@ def test_when_an_input_is_missing_or_too_short_expect_its_name_and_the_joints_it
 def test_when_the_list_of_operations_is_read_expect_exactly_that_of_the_format() -> None:
     operands = {"const", "angle", "speed", "reference_speed", "signal"}
     unary = {"neg", "sin", "cos", "asin", "acos", "exp", "sqrt", "sinc", "pow_int"}
-    unary |= {"log", "tanh", "abs", "expm1_quotient", "tanh_quotient"}
+    unary |= {"log", "tanh", "abs", "sinc_slope", "expm1_quotient", "tanh_quotient"}
     binary = {"add", "sub", "mul", "div", "atan2", "min", "max"} | {
         f"{name}_chord" for name in ("log", "abs", "atan", "asin")
     }

@@ -19,11 +19,12 @@ from quasilpv import _runtime
 from quasilpv.artifact.compilation import compile_program
 from quasilpv.artifact.plant_program import QUOTIENTS
 from quasilpv.certificate.exact.program_values import program_values
-from quasilpv.documents.programs import Program, abs_chord, asin_chord, atan_chord, evaluate_signals
+from quasilpv.documents.programs import Program, abs_chord, asin_chord, atan_chord, evaluate_signals, sinc_slope
 from quasilpv.errors import InputError
 from quasilpv.experiments.system_run import SystemExperiment, simulate
 from quasilpv.synthesis.regional.request import RegionalRequest
 from quasilpv.system_release import release_system
+from quasilpv.systems.descriptor.factorings import factorings
 from quasilpv.systems.descriptor.formula import FUNCTIONS
 from quasilpv.systems.intervals.algebra import of_functions
 from quasilpv.systems.intervals.chords import CHORDS, sinc_chord
@@ -63,6 +64,7 @@ WRITTEN: list[tuple[str, Callable[[float], float]] | object] = [
             ("(2 + x)^(1/3) - 2^(1/3)", lambda x: np.cbrt(2 + x) - np.cbrt(2)),
             ("(2 + x)^1.5 - 2^1.5", lambda x: (2 + x) ** 1.5 - 2**1.5),
             ("x*sinc(x)", np.sin),
+            ("piecewise(x < 1/2, x, x > 1, 3/4, 1/4 + x/2)", lambda x: min(x, 0.25 + x / 2, 0.75)),
         )
     ),
 ]
@@ -151,6 +153,18 @@ def test_the_checker_encloses_what_the_controller_computes(
         assert ball.overlaps(getattr(arb(at[0]), name)())
 
 
+@given(middle=st.floats(-8, 8), radius=st.sampled_from([0.0, 1e-9, 0.01, 0.3]), share=st.floats(-1, 1))
+def test_the_slope_of_sinc_is_computed_and_enclosed(middle: float, radius: float, share: float) -> None:
+    x = middle + radius * share
+    with mpmath.workdps(400):
+        exact = float((mpmath.cos(x) - mpmath.sin(x) / mpmath.mpf(x)) / mpmath.mpf(x)) if x else 0.0
+    assert sinc_slope(np.float64(x)) == pytest.approx(exact, abs=3e-15)
+    (ball,) = program_values([("signal", 0), ("sinc_slope",)], signal=[arb(middle, radius * (1 + 1e-9))])
+    assert float(ball.lower()) - 1e-15 <= exact <= float(ball.upper()) + 1e-15
+    (number,) = program_values([("signal", 0), ("sinc_slope",)], signal=[np.float64(x)])
+    assert number == pytest.approx(exact, abs=1e-11)
+
+
 def test_a_jump_is_no_function_of_an_equation() -> None:
     with pytest.raises(InputError, match="a continuous function"):
         ql.DescriptorSystem.from_equations(
@@ -217,3 +231,40 @@ def test_near_an_equilibrium_that_is_not_quite_one_the_message_has_one() -> None
 
 def test_all_quotients_have_an_explicit_form() -> None:
     assert set(CHORDS.values()) <= {*QUOTIENTS}
+
+
+def test_another_factoring_keeps_the_equilibrium_and_the_equations() -> None:
+    """The first factoring with a design is taken: one without the trim would be a controller of another point."""
+    system = ql.DescriptorSystem.from_equations(
+        ["X' = S*X/(1 + S) - d*X", "S' = d*(2 - S) - 2*S*X/(1 + S)"],
+        name="chemostat",
+        state="X S",
+        inputs="d",
+        domain={"X": (0.4, 0.6), "S": (0.8, 1.2)},
+        equilibrium=((0.5, 1.0), (0.5,)),
+        units={"X": "g/l"},
+    )
+    others = list(factorings(system))
+    assert len(others) > 1
+    for other in others:
+        assert (other.trim, other.equations, other.units) == (system.trim, system.equations, system.units)
+    artifact = release_system(RegionalRequest(system))
+    assert [s.trim for s in artifact.signals] == [0.5, 1.0, 0.5]
+    run = simulate(artifact, SystemExperiment({"X": 0.5, "S": 1.0}, {}, 0.1))
+    assert np.abs(run.state - [0.5, 1.0]).max() < 1e-12
+
+
+@pytest.mark.parametrize("drift", ["sin(a + 2*b)", "tan(a/3 - b)*(1 + b)", "abs(a + b) - 2*max(a - b, 0)"])
+def test_functions_of_sums_are_functions_again_in_the_plant(drift: str) -> None:
+    """sinc(a + 2 b) a + 2 sinc(a + 2 b) b has a slope that no program computes at 0; its sum has one everywhere."""
+    system = ql.DescriptorSystem.from_equations(
+        ["a' = b", f"b' = {drift} + u"],
+        name="sum",
+        state="a b",
+        inputs="u",
+        domain={"a": (-0.5, 0.5), "b": (-0.5, 0.5)},
+    )
+    artifact = release_system(RegionalRequest(system))
+    assert artifact.sampling is not None
+    rows = [evaluate_signals(row, [0.0] * 5) for row in artifact.plant.jacobian]
+    assert np.isfinite(rows).all()

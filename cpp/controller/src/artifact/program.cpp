@@ -20,6 +20,15 @@ double sinc(double x) noexcept {
   return std::sin(x) / x;
 }
 
+// (cos x - sinc x)/x. Below the threshold the series: the first term left out is x^9/3991680.
+double sinc_slope(double x) noexcept {
+  if (std::abs(x) < 0.1) {
+    const double x2 = x * x;
+    return -x / 3.0 * (1.0 - x2 / 10.0 * (1.0 - x2 / 28.0 * (1.0 - x2 / 54.0)));
+  }
+  return (std::cos(x) - std::sin(x) / x) / x;
+}
+
 // f(x)/x with value 0 and slope 1 at 0.
 double expm1_quotient(double x) noexcept { return x == 0.0 ? 1.0 : std::expm1(x) / x; }
 double tanh_quotient(double x) noexcept { return x == 0.0 ? 1.0 : std::tanh(x) / x; }
@@ -80,7 +89,7 @@ struct Program::Signature {
 };
 
 const Program::Signature* Program::find_signature(const std::string& name) {
-  static constexpr std::array<Signature, 30> kSignatures = {{
+  static constexpr std::array<Signature, 31> kSignatures = {{
       {"const", Op::kConst, 0, true},
       {"angle", Op::kAngle, 0, true},
       {"speed", Op::kSpeed, 0, true},
@@ -97,6 +106,7 @@ const Program::Signature* Program::find_signature(const std::string& name) {
       {"tanh", Op::kTanh, 1, false},
       {"abs", Op::kAbs, 1, false},
       {"sinc", Op::kSinc, 1, false},
+      {"sinc_slope", Op::kSincSlope, 1, false},
       {"expm1_quotient", Op::kExpm1Quotient, 1, false},
       {"tanh_quotient", Op::kTanhQuotient, 1, false},
       {"pow_int", Op::kPowInt, 1, true},
@@ -236,6 +246,9 @@ void Program::evaluate(const ProgramInput& input, double* output) const noexcept
         break;
       case Op::kSinc:
         next[-1] = sinc(next[-1]);
+        break;
+      case Op::kSincSlope:
+        next[-1] = sinc_slope(next[-1]);
         break;
       case Op::kPowInt:
         next[-1] = integer_power(next[-1], instruction.index);

@@ -13,12 +13,14 @@ from quasilpv.documents.programs import MAX_LENGTH, MAX_POWER, MAX_STACK, OPERAT
 from quasilpv.errors import InputError
 from quasilpv.systems.intervals.chords import (
     Ramp,
+    SmoothSinc,
     abs_chord,
     asin_chord,
     atan_chord,
     cosh_chord,
     log_chord,
     ramp_chord,
+    sinc_slope,
     sinh_chord,
     tan_chord,
     tanh_chord,
@@ -83,6 +85,8 @@ class _Compiler:
         sympy.acos: "acos",
         sympy.exp: "exp",
         sympy.sinc: "sinc",
+        SmoothSinc: "sinc",
+        sinc_slope: "sinc_slope",
         sympy.log: "log",
         sympy.tanh: "tanh",
         sympy.Abs: "abs",

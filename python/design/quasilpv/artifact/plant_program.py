@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,10 +10,10 @@ import sympy as sp
 
 from quasilpv.artifact.compilation import compile_program
 from quasilpv.systems.descriptor.affine_system import AffineSystem
-from quasilpv.systems.descriptor.names import rate
+from quasilpv.systems.descriptor.names import rate, symbol
 from quasilpv.systems.descriptor.premise import AffineMatrix
 from quasilpv.systems.intervals.algebra import of_functions
-from quasilpv.systems.intervals.chords import CHORDS, as_ramps
+from quasilpv.systems.intervals.chords import CHORDS, SmoothSinc, as_ramps
 from quasilpv.systems.intervals.quotients import expm1_quotient, tanh_quotient
 
 
@@ -40,7 +40,7 @@ def plant_document(system: AffineSystem, signals: Sequence[sp.Symbol]) -> dict[s
     Raises:
         InputError: an expression has no program.
     """
-    residual = residual_expressions(system, signals)
+    residual = [row.replace(sp.sinc, SmoothSinc) for row in residual_expressions(system, signals)]
     rates = [rate(symbol) for symbol in system.state]
     numbers = {symbol: ("signal", k) for k, symbol in enumerate([*signals, *rates])}
     rows = [[sp.diff(row, symbol) for symbol in [*rates, *system.state]] for row in residual]
@@ -51,8 +51,11 @@ def plant_document(system: AffineSystem, signals: Sequence[sp.Symbol]) -> dict[s
 
 
 def residual_expressions(system: AffineSystem, signals: Sequence[sp.Symbol]) -> list[sp.Expr]:
-    """``E(z) x' - A(z) x - B(z) u - d``, one expression per equation."""
+    """``F(x', x, u)``, one expression per equation: as it was written, or ``E(z) x' - A(z) x - B(z) u - d``."""
     n, m = system.order, len(system.inputs)
+    if system.equations:
+        written = {symbol(name): signal for name, signal in zip(system.inputs, signals[n : n + m], strict=True)}
+        return [equation.xreplace(written) for equation in system.equations]
     inputs = sp.Matrix(signals[n : n + m])
     rates = sp.Matrix([rate(symbol) for symbol in system.state])
     left = _whole(system, system.E, rates)
@@ -76,10 +79,21 @@ def _whole(system: AffineSystem, matrix: AffineMatrix, vector: sp.Matrix) -> lis
     ]
     for premise, coefficients in terms:
         for i in range(rows):
-            for j in range(columns):
-                if coefficients[i, j] != 0.0:
-                    total[i] += _product(sp.Float(coefficients[i, j]), premise, vector[j])
+            own = {vector[j]: coefficients[i, j] for j in range(columns) if coefficients[i, j] != 0.0}
+            total[i] += _row(premise, own)
     return total
+
+
+def _row(premise: sp.Expr, factors: Mapping[sp.Expr, float]) -> sp.Expr:
+    """A premise times a sum: sinc(a + b) a + sinc(a + b) b is sin(a + b), and no part alone is a function again."""
+    parts = [_product(sp.Float(number), premise, factor) for factor, number in factors.items()]
+    if len(parts) > 1 and any(part.has(*QUOTIENTS) for part in parts):
+        first = next(iter(factors.values()))
+        ratios = (sp.Rational(number) / sp.Rational(first) * factor for factor, number in factors.items())
+        whole = _product(sp.Float(first), premise, sp.Add(*ratios))
+        if not whole.has(*QUOTIENTS):
+            return whole
+    return sp.Add(*parts)
 
 
 def _product(number: sp.Float, premise: sp.Expr, factor: sp.Expr) -> sp.Expr:

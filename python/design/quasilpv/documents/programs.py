@@ -27,11 +27,21 @@ MAX_POWER = 16
 MAX_JOINTS = 7
 MAX_SIGNALS = 128
 
+SERIES_RADIUS = 0.1
+"""Up to here the derivative of sinc is summed from its series: the first term left out is x^9/4e6."""
+
 
 def sinc(x: Any) -> Any:
     """Return ``sin(x)/x``, 1 at 0 (not the normalised ``numpy.sinc``); elementwise, any shape."""
     safe = np.where(x == 0.0, 1.0, x)
     return np.where(x == 0.0, 1.0, np.sin(safe) / safe)
+
+
+def sinc_slope(x: Any) -> Any:
+    """Return ``(cos(x) - sin(x)/x)/x``, the derivative of ``sinc``, 0 at 0; elementwise, any shape."""
+    near, safe = np.abs(x) < SERIES_RADIUS, np.where(np.abs(x) < SERIES_RADIUS, 1.0, x)
+    series = -x / 3.0 * (1.0 - x * x / 10.0 * (1.0 - x * x / 28.0 * (1.0 - x * x / 54.0)))
+    return np.where(near, series, (np.cos(safe) - np.sin(safe) / safe) / safe)
 
 
 def quotient(function: Callable[[Any], Any], x: Any) -> Any:
@@ -114,6 +124,7 @@ OPERATIONS: Mapping[str, Operation] = {
     "tanh": Operation(1, None, np.tanh),
     "abs": Operation(1, None, np.abs),
     "sinc": Operation(1, None, sinc),
+    "sinc_slope": Operation(1, None, sinc_slope),
     "expm1_quotient": Operation(1, None, functools.partial(quotient, np.expm1)),
     "tanh_quotient": Operation(1, None, functools.partial(quotient, np.tanh)),
     "pow_int": Operation(1, "power", integer_power),

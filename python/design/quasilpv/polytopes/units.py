@@ -121,7 +121,7 @@ class Units:
                 symbol: (low / factors.get(symbol, 1.0), high / factors.get(symbol, 1.0))
                 for symbol, (low, high) in system.domain.items()
             }
-        return replace(system, **changed)
+        return replace(system, **changed, equations=())
 
 
 def _parts(matrix: AffineMatrix) -> tuple[FloatArray, FloatArray]:

@@ -62,6 +62,7 @@ class Program {
     kTanh,
     kAbs,
     kSinc,
+    kSincSlope,
     kExpm1Quotient,
     kTanhQuotient,
     kPowInt,

@@ -38,6 +38,15 @@ def _sinc(x: Scalar) -> Scalar:
     return functools.reduce(arb.union, parts)
 
 
+def _sinc_slope(x: Scalar) -> Scalar:
+    """``(cos x - sinc x)/x``; of balls also ``x sinc''`` with ``|sinc''| <= 1/3``, which 0 does not disturb."""
+    if not isinstance(x, arb):
+        safe = np.where(np.abs(x) < SINC_RADIUS, 1.0, x)
+        return np.where(np.abs(x) < SINC_RADIUS, -x / 3.0 + x**3 / 30.0, (np.cos(safe) - np.sin(safe) / safe) / safe)
+    by_curvature = x * arb(0, 1) / 3
+    return by_curvature if x.contains(0) else by_curvature.intersection((x.cos() - x.sin() / x) / x)
+
+
 def _quotient(name: str, slope: Callable[[Scalar], Scalar]) -> Callable[[Scalar], Scalar]:
     """``f(x)/x`` with value 0 and slope 1 at 0: near 0, where a ball holds 0, by the mean value theorem its slopes."""
 
@@ -92,6 +101,7 @@ def _arc(name: str) -> Callable[[Scalar], Scalar]:
 _UNARY: Mapping[str, Callable[[Scalar], Scalar]] = {
     "neg": operator.neg,
     "sinc": _sinc,
+    "sinc_slope": _sinc_slope,
     "abs": operator.abs,
     "expm1_quotient": _quotient("expm1", lambda x: x.exp()),
     "tanh_quotient": _quotient("tanh", lambda x: 1 - x.tanh() ** 2),
@@ -100,7 +110,7 @@ _UNARY: Mapping[str, Callable[[Scalar], Scalar]] = {
 }
 
 
-_WITHOUT_SLOPE = frozenset({"min", "max", "atan2", *CHORDS, "sinc", "expm1_quotient", "tanh_quotient"})
+_WITHOUT_SLOPE = frozenset({"min", "max", "atan2", *CHORDS, "sinc", "sinc_slope", "expm1_quotient", "tanh_quotient"})
 """Operations whose slope is not built."""
 
 

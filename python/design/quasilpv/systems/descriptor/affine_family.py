@@ -66,7 +66,7 @@ class AffineFamily:
             for name, slopes in self.slopes.items():
                 total = total + (point[name] - self.base[name]) / self.steps[name] * slopes[index]
             moved[field] = AffineMatrix(total[0], total[1:])
-        return replace(self.origin, **moved)
+        return replace(self.origin, **moved, equations=())
 
 
 def affine_family(

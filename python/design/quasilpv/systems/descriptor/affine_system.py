@@ -50,6 +50,8 @@ class AffineSystem:
         from_formulas: the drift was given as a function of the state, and A(x) is one way among others to write it as
             A(x) x (`from_equations`).
         trim: the equilibrium that states and inputs are deviations from, (n + m,); empty for the origin.
+        equations: F of ``F(x, x', u) = 0`` as they were written (`from_equations`), of the deviations, in the order of
+            the rows; empty where there are none, or in other units.
         units: by name of a state, an input or a parameter, for people, logs and figures; those not named have none.
 
     Raises:
@@ -71,6 +73,7 @@ class AffineSystem:
     given_by_rules: bool = False
     from_formulas: bool = False
     trim: tuple[float, ...] = ()
+    equations: tuple[sp.Expr, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

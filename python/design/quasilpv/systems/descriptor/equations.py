@@ -17,6 +17,7 @@ from quasilpv.systems.descriptor.names import rate, symbol
 from quasilpv.systems.descriptor.rest import nearest_rest
 from quasilpv.systems.descriptor.vocabulary import Formula, Vocabulary, exact
 from quasilpv.systems.intervals.chords import without_products_of_signs
+from quasilpv.systems.intervals.piecewise import clamped
 
 __all__ = ["RESIDUAL", "EquationMatrices", "Equilibrium", "equation_matrices", "rate"]
 
@@ -25,7 +26,8 @@ RESIDUAL = 1e-9
 
 
 class EquationMatrices(NamedTuple):
-    """What a set of equations says: the states in order, E(x), A(x), B(x), C(x) as expressions, and the constants d."""
+    """What a set of equations says: the states in order, E(x), A(x), B(x), C(x) as expressions, the constants d, and
+    the equations themselves, of the deviations, in the order of the rows."""
 
     state: tuple[sp.Symbol, ...]
     E: sp.Matrix
@@ -33,6 +35,7 @@ class EquationMatrices(NamedTuple):
     B: sp.Matrix
     C: sp.Matrix
     d: tuple[float, ...]
+    residuals: tuple[sp.Expr, ...]
 
 
 class Equilibrium(NamedTuple):
@@ -150,6 +153,7 @@ def equation_matrices(
         B.extract(rows, list(range(B.cols))),
         sp.Matrix(measured).reshape(len(measured), len(ordered)),
         tuple(constants),
+        tuple(clamped(f"{source}: equation {row + 1}", residuals[row]) for row in rows),
     )
 
 

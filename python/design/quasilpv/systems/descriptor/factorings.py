@@ -123,7 +123,7 @@ def _drift(system: DescriptorSystem, terms: Mapping[Place, list[Row]], choices: 
 
 
 def _rebuilt(system: DescriptorSystem, E: sp.Matrix, A: sp.Matrix, B: sp.Matrix, C: sp.Matrix) -> DescriptorSystem:
-    """The system of these matrices, with what the controller knows and the disturbance of the given one."""
+    """The given system with these matrices: its equilibrium, disturbance and equations are what they were."""
     by_kind = {
         kind: {s for p in system.premises if (p.kind is PremiseKind.UNKNOWN) is kind for s in p.expression.free_symbols}
         for kind in (True, False)
@@ -140,4 +140,4 @@ def _rebuilt(system: DescriptorSystem, E: sp.Matrix, A: sp.Matrix, B: sp.Matrix,
         domain=system.domain,
         unknown=unknown,
     )
-    return replace(other, disturbance=system.disturbance, from_formulas=system.from_formulas, units=system.units)
+    return replace(system, premises=other.premises, E=other.E, A=other.A, B=other.B, C=other.C)

@@ -99,6 +99,7 @@ class DescriptorSystem(AffineSystem):
         disturbance: tuple[float, ...] = (),
         from_formulas: bool = False,
         trim: tuple[float, ...] = (),
+        equations: tuple[sp.Expr, ...] = (),
         units: Mapping[str, str] | None = None,
     ) -> DescriptorSystem:
         """The system of matrices whose entries have been read; state and domain are those of the names by default."""
@@ -116,6 +117,7 @@ class DescriptorSystem(AffineSystem):
                     disturbance=disturbance,
                     from_formulas=from_formulas,
                     trim=trim,
+                    equations=tuple(left_open.closed([sp.Matrix(equations)])[0]) if equations else (),
                     units=units,
                 )
             left_open.made.append(Made(system, matrices, premises, names.unknown))
@@ -138,6 +140,7 @@ class DescriptorSystem(AffineSystem):
             disturbance=disturbance,
             from_formulas=from_formulas,
             trim=trim,
+            equations=equations,
             units=dict(units or {}),
         )
 
@@ -202,6 +205,7 @@ class DescriptorSystem(AffineSystem):
             disturbance=matrices.d if any(matrices.d) else (),
             from_formulas=True,
             trim=around.values(matrices.state, names.inputs),
+            equations=matrices.residuals,
             units=units,
         )
 

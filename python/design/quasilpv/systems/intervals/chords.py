@@ -66,6 +66,26 @@ def without_products_of_signs(expression: sp.Expr) -> sp.Expr:
     return expression.replace(lambda node: node.is_Mul and node.has(sp.sign), written)
 
 
+class sinc_slope(sp.Function):  # type: ignore[misc]  # noqa: N801 -- spelt like the function
+    """``sinc'(w) = (cos w - sinc w)/w``, 0 at 0."""
+
+    nargs = 1
+
+    @staticmethod
+    def _imp_(w: ArrayLike) -> FloatArray:
+        return _sinc_slope(np.asarray(w, dtype=float))
+
+
+class SmoothSinc(sp.Function):  # type: ignore[misc]
+    """sin(w)/w with the slope that sympy writes as a difference of two quotients by 0."""
+
+    nargs = 1
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """The slope."""
+        return sinc_slope(self.args[0])
+
+
 class Chord(sp.Function):  # type: ignore[misc]
     """``(g(a + w) - g(a))/w``; subclasses name g. `_imp_` is what `sympy.lambdify` and `evalf` call."""
 
