@@ -61,6 +61,7 @@ def test_questions_about_systems_that_differ_in_anything_are_different_questions
         "given_by_rules": True,
         "from_formulas": False,
         "trim": (0.0, 0.0, 0.0, 1e-3, 0.0),
+        "equations": one.equations[:-1],
         "units": {symbol.name: "m"},
     }
     assert others.keys() == {field.name for field in fields(one)}
