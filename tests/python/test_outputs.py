@@ -103,7 +103,7 @@ CALLS = {
         (("cli.animate._animate", {}), ("cli.gallery.Gallery", MagicMock()), ("cli.session.Session.run", None)),
         True,
     ),
-    "hil": Call(("stabilise-arm2", "--controller", "pid", "--no-log"), folder=True),
+    "hil": Call(("stabilise-arm2", "--controller", "pdc", "--no-log"), folder=True),
     "log": Call(("info", "LOG")),
     "view": Call(
         ("--log", "LOG", "--no-browser"),

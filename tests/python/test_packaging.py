@@ -159,9 +159,9 @@ def test_when_the_wheel_is_installed_alone_expect_the_demo_to_do_the_main_job(
     default_bits = Sensors().encoder_bits  # the default law runs with coarser encoders as well
     rows = [run for run in made["runs"] if run["sensors"]["encoder_bits"] == default_bits]
     best = {row["scenario"]: row for row in rows if row["controller"] == "dob-acceleration"}
-    assert set(best) == {"serial-square", "serial-circle"}
+    assert {"serial-square", "serial-circle"} <= set(best)
     for row in rows:
-        if row["controller"] in {"pid", "ctc", "ctc-dob"}:
+        if row["scenario"].startswith("serial") and row["controller"] in {"pid", "ctc", "ctc-dob"}:
             assert best[row["scenario"]]["rms_x_m"] < row["rms_x_m"] / 10
         assert (tmp_path / "demo" / row["scenario"] / "comparison.png").stat().st_size > 0
     assert "verified" in run(command, "verify", made["artifact"]["json"], cwd=tmp_path)

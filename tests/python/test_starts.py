@@ -18,7 +18,8 @@ from quasilpv.scenarios import build_scenario, tracking_experiment
 from quasilpv.synthesis import CONTROLLERS, DesignRequest, Specification
 from quasilpv.systems.robots.registry import robot
 
-TRACKING = tuple(name for name in CONTROLLERS if name not in ("pdc", "descriptor", "robust", "delayed"))
+STABILISING = ("pdc", "descriptor", "robust", "delayed")
+TRACKING = tuple(name for name, kind in CONTROLLERS.items() if kind.function and name not in STABILISING)
 TABLE = (
     *(("serial-square", name) for name in TRACKING if name != "dob-torque-premultiplied"),
     *(("fivebar-spiral", name) for name in TRACKING),
