@@ -155,6 +155,7 @@ void ControlLoop::step(const StepInput& sample, const SampleConditions& conditio
   const std::int64_t start_ns = monotonic_ns();
   input.reference = path(input.seq);
   advance_start(input);
+  overrule(input, conditions.now_ns);
   StepReport report = controller_.step(input);
   const std::int64_t step_ns = monotonic_ns() - start_ns;
 
@@ -171,17 +172,28 @@ void ControlLoop::step(const StepInput& sample, const SampleConditions& conditio
   }
 }
 
+void ControlLoop::overrule(StepInput& input, std::int64_t now_ns) noexcept {
+  last_valid_angle_ = input.valid ? input.angle : last_valid_angle_;
+  last_valid_speed_ = input.valid ? input.speed : JointArray{};  // nothing is known of it now
+  if (failsafe_.state == ControllerState::kFault) {
+    input.overruled = true;
+    input.in_force = safe_torque(now_ns);
+  }
+}
+
+JointArray ControlLoop::safe_torque(std::int64_t now_ns) const noexcept {
+  const FailsafeAction action = action_of(settings_.failsafe, failsafe_, now_ns);
+  return safe_torque_.apply(action.safe_share, torque_at_fault_, last_torque_, last_valid_angle_, last_valid_speed_);
+}
+
 void ControlLoop::note_measurement(const StepInput& input, StepReport& report) noexcept {
   report.flags |= implausible_ ? kMeasurementImplausible : kStepHealthy;
   if ((report.flags & kMeasurementInvalid) != 0) {
     ++consecutive_invalid_;
     ++predicted_steps_;
-    last_valid_speed_ = {};  // nothing is known of it now
     return;
   }
   consecutive_invalid_ = 0;
-  last_valid_angle_ = input.angle;
-  last_valid_speed_ = input.speed;
   plausibility_.estimate(report.estimated_speed);
   const bool too_fast = plausibility_.is_beyond_domain(report.estimated_speed);
   report.flags |= too_fast ? kSpeedBeyondDomain : kStepHealthy;
@@ -232,10 +244,13 @@ bool ControlLoop::is_safe(std::int64_t now_ns) const noexcept {
 }
 
 void ControlLoop::write_command(const StepReport& report, const StepInput& input, std::int64_t now_ns) noexcept {
-  const FailsafeAction action = action_of(settings_.failsafe, failsafe_, now_ns);
-  last_torque_ = action.use_safe_torque ? safe_torque_.apply(action.safe_share, torque_at_fault_, last_torque_,
-                                                             last_valid_angle_, last_valid_speed_)
-                                        : report.torque_applied;
+  if (input.overruled) {
+    last_torque_ = input.in_force;
+  } else if (failsafe_.state == ControllerState::kFault) {  // by this sample: its law did not know
+    last_torque_ = safe_torque(now_ns);
+  } else {
+    last_torque_ = report.torque_applied;
+  }
   command_.seq = input.seq;
   command_.state = failsafe_.state;
   command_.flags = report.flags;

@@ -112,6 +112,8 @@ class ControlLoop {
   void refuse_start(std::int64_t seq, std::int64_t now_ns) noexcept;
   void advance_start(StepInput& input) noexcept;
   void join(const StepInput& input) noexcept;
+  void overrule(StepInput& input, std::int64_t now_ns) noexcept;
+  JointArray safe_torque(std::int64_t now_ns) const noexcept;
   void note_measurement(const StepInput& input, StepReport& report) noexcept;
   void step(const StepInput& input, const SampleConditions& conditions, bool plant_silent) noexcept;
   void predict_missing(std::int64_t next_seq, const SampleConditions& conditions) noexcept;

@@ -31,8 +31,10 @@ struct StepInput {
   JointArray angle{};     ///< what the law controls; see Controller::choose_angle()
   JointArray speed{};
   Reference reference{};
-  GearReading gears{};   ///< what else is measured of joints that give
-  bool joining = false;  ///< the reference is off its path by `offset` (JoiningSegment)
+  GearReading gears{};     ///< what else is measured of joints that give
+  bool overruled = false;  ///< whatever the law answers, `in_force` acts until the next sample: the law watches
+  JointArray in_force{};   ///< N m
+  bool joining = false;    ///< the reference is off its path by `offset` (JoiningSegment)
   Reference offset{};
 };
 
@@ -56,7 +58,7 @@ struct StepReport {
   std::int64_t seq = 0;
   std::uint32_t flags = kStepHealthy;
   JointArray torque_commanded{};  ///< N m, before limits
-  JointArray torque_applied{};    ///< N m, after the finite check, saturation and slew limit: what the plant gets
+  JointArray torque_applied{};    ///< N m, after the limits: what the plant gets; StepInput::in_force if overruled
   JointArray estimated_angle{};   ///< corrected estimate at this sample
   JointArray estimated_speed{};
   JointArray estimated_disturbance{};

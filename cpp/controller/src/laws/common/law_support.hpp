@@ -193,6 +193,16 @@ struct Command {
   JointVector<N> integral_gain;
 };
 
+/// The torque that acts, from the one commanded, into the report: what the limits leave of it, unless the law is
+/// overruled. Returns the flags of the limiter.
+inline std::uint32_t limit(Limiter& limiter, const StepInput& input, StepReport& report) noexcept {
+  const std::uint32_t flags = limiter.apply(report.torque_commanded, input.commanded, report.torque_applied);
+  if (input.overruled) {
+    report.torque_applied = input.in_force;
+  }
+  return flags;
+}
+
 /// Forward Euler of the integral of the error, e_I += T e, of the joints that have integral action. Anti-windup by
 /// clamping: joint j is frozen while its torque is limited and gain_j e_j pushes further in the direction that the
 /// limits cut off, or while the torque is not finite.

@@ -15,9 +15,10 @@ struct ObserverState {
   JointVector<N> filtered_disturbance;
   JointVector<N> integral_error;
 
-  static ObserverState undisturbed(const JointVector<N>& angle, const JointVector<N>& speed) noexcept {
+  static ObserverState at(const JointVector<N>& angle, const JointVector<N>& speed,
+                          const JointVector<N>& disturbance) noexcept {
     const JointVector<N> zero = JointVector<N>::Zero();
-    return {angle, speed, zero, zero, zero, zero};
+    return {angle, speed, disturbance, zero, zero, zero};
   }
 
   /// d_f = q d_f + (1 - q) d of these joints; of others it stays.

@@ -30,7 +30,7 @@ StepReport VelocityLaw<N>::step(const StepInput& input) noexcept {
     command.torque += holding_torque(input.offset, sample.angle, model);
   }
   to_array<N>(command.torque, report.torque_commanded);
-  report.flags |= limiter_.apply(report.torque_commanded, input.commanded, report.torque_applied);
+  report.flags |= limit(limiter_, input, report);
   if (valid) {
     const JointVector<N> error = reference.angle - sample.angle;
     const JointVector<N> gain =
