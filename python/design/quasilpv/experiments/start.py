@@ -124,23 +124,34 @@ class _Run:
         return law.step(angle, angle, np.zeros(n), acceleration, np.zeros(n)).torque_applied[:n]
 
 
-def start(artifact: Artifact, trajectory: Trajectory, scenario: Scenario, kind: Start) -> StartOutcome:
+def undisturbed_speeds(artifact: Artifact, trajectory: Trajectory, scenario: Scenario) -> FloatArray:
+    """Speeds of the run that nothing interrupts, magnitudes, (samples + 1, n).
+
+    Args:
+        artifact: the controller.
+        trajectory: the reference.
+        scenario: the plant and its disturbances; begun half an encoder step from where it says.
+    """
+    run = _Run.of(artifact, trajectory, _at_an_edge(scenario))
+    return run.follow(run.loop(bumpless=False), run.session.samples)
+
+
+def start(
+    artifact: Artifact, trajectory: Trajectory, scenario: Scenario, kind: Start, speeds: FloatArray
+) -> StartOutcome:
     """Start a controller and compare its motion with that of the undisturbed run.
 
     Args:
         artifact: the controller.
         trajectory: the reference.
-        scenario: the plant and how it begins; `Start.BESIDE` moves it. Its disturbances are those of both runs. The
-            undisturbed one begins half an encoder step from there.
+        scenario: the plant and how it begins; `Start.BESIDE` moves it. Its disturbances are those of both runs.
         kind: of start. A restart or a fault interrupts the run when the undisturbed one is fastest.
+        speeds: of the undisturbed run, from `undisturbed_speeds`: one serves all kinds.
 
     Raises:
         ClaimError: the controller does not start.
     """
-    undisturbed = _Run.of(artifact, trajectory, _at_an_edge(scenario))
-    samples = undisturbed.session.samples
-    speeds = undisturbed.follow(undisturbed.loop(bumpless=False), samples)
-    usual = speeds.max(axis=0)
+    samples, usual = len(speeds) - 1, speeds.max(axis=0)
     if kind is Start.BESIDE:
         beside = {"angle_rad": tuple(np.array(scenario.initial.angle_rad) + _beside(artifact, scenario))}
         beside["speed_rad_s"] = (0.0,) * artifact.joints
