@@ -86,7 +86,7 @@ def test_when_the_page_is_followed_expect_the_law_designed_verified_tracked_and_
     say("git", "init", "--quiet", cwd=copied_sources(sources))
     apply_page(sources)
     pip = (sys.executable, "-m", "pip", "install", "--no-build-isolation", "--no-deps", "--target", site, sources)
-    say(*pip, cwd=work)
+    say(*pip, cwd=work, CCACHE_BASEDIR=str(sources))
     # -S: no .pth files, so that the editable installation of these sources is not found. Executables are looked for
     # beside the interpreter.
     packages = sysconfig.get_paths()
