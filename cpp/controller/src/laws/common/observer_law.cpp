@@ -31,10 +31,11 @@ StepReport ObserverLaw<N>::step(const StepInput& input) noexcept {
   if (!lost_sight_ && valid) {
     first_disturbance_ = state_.disturbance;
   }
+  const JointMask<N> follow = compensated(y, reference);
   if (starting) {
     state_.filtered_disturbance = share_at_once(model, reference, report) * state_.disturbance;
   } else {
-    state_.filter(filter_pole_, compensated(y, reference));
+    state_.filter(filter_pole_, follow);
   }
   state_.write_to(report);
   const Command<N> command = control(state_, model, reference, report);
