@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -172,6 +173,28 @@ def performance(controller: str, tuning: baselines.Tuning) -> tuple[float, float
 def tuning_of(design: TrackingDesign) -> baselines.Tuning:
     names = baselines.Tuning.__dataclass_fields__
     return baselines.Tuning(**{name: design.report[name] for name in names})
+
+
+@pytest.mark.parametrize("way", [-300.0, 300.0, 1e3])
+def test_when_a_descent_asks_for_a_point_without_bounds_expect_a_measure_of_one_that_can_be(
+    way: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm = robot("arm2")
+    axes = {"bandwidth": (0.05,), "filter_time": (1.0,), "inertia_scale": (1.0,)}
+    search = tuning_search.TuningSearch(
+        arm, Specification(), tuned_baselines.pid_law, axes, PlantGrid.screen(arm), no_progress
+    )
+    point = {name: values[0] for name, values in axes.items()}
+    start = tuning_search.Candidate(point, search.tuning(point), 1.0, 1.0)
+    asked = []
+
+    def far(objective: Callable[[FloatArray], float], origin: FloatArray, **_: object) -> None:
+        asked.append(objective(origin + way))
+
+    monkeypatch.setattr(tuning_search.scipy.optimize, "minimize", far)
+    search._descend(start, 1)
+    assert np.isfinite(asked).all()
+    assert len(asked) == 1
 
 
 @pytest.mark.parametrize("controller", ONE_SEARCH)

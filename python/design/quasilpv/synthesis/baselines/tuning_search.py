@@ -37,6 +37,8 @@ LARGEST = {"integral_ratio": 1.0, "payload_fraction": 1.0}
 BRANCHES = 3
 FIRST_STEP = 0.15
 LAST_STEP = 1e-4
+FARTHEST = 10.0
+"""From where a descent began, in logarithms: after degenerate steps COBYLA asks for points without bounds."""
 SLACK = 1e-4
 GROWTH_UNIT = 0.003
 """Growth rates, in units of this part of the sample rate, are constraints as their hyperbolic tangents."""
@@ -151,17 +153,18 @@ class TuningSearch:
     def _descend(self, start: Candidate, budget: int) -> None:
         """Constrained descent from an admissible point with a number of evaluations."""
         known: dict[bytes, tuple[float, FloatArray]] = {}
+        origin = np.log([start.point[name] for name in self.axes])
 
         def measured(x: FloatArray) -> tuple[float, FloatArray]:
             key = x.tobytes()  # objective and constraints are asked for one after the other
             if key not in known:
-                known[key] = self._measure(np.exp(x))
+                known[key] = self._measure(np.exp(np.clip(x, origin - FARTHEST, origin + FARTHEST)))
             return known[key]
 
         upper = [math.log(self.largest[name]) if name in self.largest else math.inf for name in self.axes]
         scipy.optimize.minimize(
             lambda x: measured(x)[0],
-            np.log([start.point[name] for name in self.axes]),
+            origin,
             method="COBYLA",
             bounds=[(-math.inf, high) for high in upper],
             constraints=[{"type": "ineq", "fun": lambda x: measured(x)[1] - SLACK}],
