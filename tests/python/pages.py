@@ -82,7 +82,8 @@ def commands(page: Path) -> Iterator[Command]:
 def unprinted(said: str, printed: str) -> list[str]:
     """Lines of a page that a command did not print, in their order: it may print more lines between them.
 
-    Words have to be the same, and numbers within 1 %: last digits are the machine's, its libraries' and solvers'.
+    Words have to be the same, and numbers within 1 %, those with a point and what rounding makes of that: last digits
+    are the machine's, its libraries' and solvers'.
     A page writes `...` for a number that is another one every time.
     """
     rest, missing = iter(printed.splitlines()), []
@@ -99,10 +100,18 @@ NUMBER = re.compile(r"(?<![A-Za-z_])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|(?<= )\.
 def _same(said: str, printed: str) -> bool:
     (here, numbers), (there, others) = _parted(said), _parted(printed)
     pairs = zip(numbers, others, strict=False)
-    return here == there and all(abs(a - b) <= 0.01 * abs(a) or isnan(a) for a, b in pairs)
+    return here == there and all(abs(a - b) <= 0.01 * abs(a) + rounding or isnan(a) for (a, rounding), (b, _) in pairs)
 
 
-def _parted(line: str) -> tuple[str, list[float]]:
-    """Words of a line with a mark for each number, and the numbers."""
-    numbers = [float(found.replace("−", "-").replace("...", "nan")) for found in NUMBER.findall(line)]
+def _parted(line: str) -> tuple[str, list[tuple[float, float]]]:
+    """Words of a line with a mark for each number, and the numbers, with half of their last place after a point."""
+    numbers = [
+        (float(text.replace("−", "-").replace("...", "nan")), _half_a_digit(text)) for text in NUMBER.findall(line)
+    ]
     return " ".join(NUMBER.sub("#", line).split()), numbers
+
+
+def _half_a_digit(number: str) -> float:
+    digits, _, exponent = number.partition("e")
+    _, point, decimals = digits.partition(".")
+    return 0.5 * 10.0 ** (int(exponent or 0) - len(decimals)) if point and decimals else 0.0

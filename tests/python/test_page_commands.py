@@ -106,6 +106,10 @@ def test_when_a_page_says_something_else_than_is_printed_expect_the_line() -> No
     assert unprinted("ctc-dob  -1.02e-3\n", printed) == ["ctc-dob  -1.02e-3"]
     assert unprinted("in ... s\n", "in 0.1 s") == []
     assert unprinted("pid  93.6\n", printed) == ["pid  93.6"]
+    assert unprinted("pid  1.99\n", "pid  1.97") == []  # 1 % and half a digit
+    assert unprinted("pid  1.99\n", "pid  1.95") == ["pid  1.99"]
+    assert unprinted("pid  1.99e+3\n", "pid  1970.0") == []
+    assert unprinted("pid  199\n", "pid  196") == ["pid  199"]
     assert unprinted("ctc-dob  -1e-3\npd  93.6\n", printed) == ["pd  93.6"]  # another order
 
 
