@@ -10,7 +10,7 @@ from hypothesis import settings
 # ./tools/test --full draws fresh ones, and more.
 matplotlib.use("Agg")
 settings.register_profile("quick", deadline=None, derandomize=True)
-settings.register_profile("full", deadline=None, max_examples=1000, print_blob=True)
+settings.register_profile("full", deadline=None, max_examples=300, print_blob=True)
 settings.load_profile("quick")
 
 # The helpers of the tests with real processes hold fixtures and assertions.
