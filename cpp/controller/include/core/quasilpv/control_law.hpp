@@ -21,8 +21,8 @@ class ControlLaw {
   virtual void reset() noexcept = 0;
 
   /// Forgets all state, for a robot that moves already: the slew limit holds from the torque in force, N m, and the
-  /// first valid measurement finds the joints at `speed`, rad/s. What a law knows of the disturbance, a load or a push
-  /// from outside, outlives this: the arm is the one it was. RT-SAFE (bounded, no allocation, no lock, no throw).
+  /// first valid measurement finds the joints at `speed`, rad/s. A law that observes angle, speed and disturbance
+  /// keeps what it measured of the disturbance. RT-SAFE (bounded, no allocation, no lock, no throw).
   virtual void take_over(const JointArray& in_force, const JointArray& speed) noexcept = 0;
 
  protected:

@@ -31,7 +31,7 @@ StepReport ObserverLaw<N>::step(const StepInput& input) noexcept {
   if (!lost_sight_ && valid) {
     first_disturbance_ = state_.disturbance;
   }
-  const JointMask<N> follow = compensated(y, reference);
+  const JointMask<N> follow = compensated(y, reference);  // counts samples: asked in every one
   if (starting) {
     state_.filtered_disturbance = share_at_once(model, reference, report) * state_.disturbance;
   } else {
