@@ -17,7 +17,8 @@ Speaker speaker_of(const Message& message) noexcept {
 
 template <std::size_t size>
 bool are_identical(const double (&a)[size], const double (&b)[size]) noexcept {
-  return std::memcmp(a, b, sizeof(a)) == 0;  // NaN is a value here
+  // NaN is a value here, and -0 is not 0.
+  return std::memcmp(a, b, sizeof(a)) == 0;  // NOLINT(bugprone-suspicious-memory-comparison)
 }
 
 /// Whether two messages about one sample say the same; their time may differ.

@@ -72,7 +72,7 @@ class PlantFriction {
   void bristle_rates(Plant::ConstVector y, Plant::Vector rates) const noexcept;
 
   /// Adds what the torques, in the rows from `force` on, and the bristles' own equations b' - rate = 0 contribute.
-  void add_jacobian(Plant::ConstVector y, double c_j, int force, Plant::Matrix jacobian) const noexcept;
+  void add_jacobian(Plant::ConstVector y, double c_j, Eigen::Index force, Plant::Matrix jacobian) const noexcept;
 
   /// In the bristles, J.
   double energy(Plant::ConstVector y) const noexcept;

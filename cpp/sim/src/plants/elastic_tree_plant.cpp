@@ -23,7 +23,7 @@ JointArray joint_array(Plant::ConstVector x) noexcept {
   return array;
 }
 
-Eigen::Map<const TreeVector> as_vector(const JointArray& values, int joints) noexcept {
+Eigen::Map<const TreeVector> as_vector(const JointArray& values, Eigen::Index joints) noexcept {
   return {values.data(), joints};
 }
 
@@ -116,7 +116,7 @@ Eigen::VectorXd ElasticTreePlant::absolute_tolerance(double tolerance) const {
 }
 
 Eigen::VectorXd ElasticTreePlant::initial_state(const JointArray& angle, const JointArray& speed) const {
-  const int n = joints();
+  const Eigen::Index n = joints();
   const TreeVector rest = TreeVector::Zero(n);
   TreeVector weight(n);
   dynamics_.torque_at_rest(angle.data(), rest.data(), weight.data());
@@ -130,7 +130,7 @@ Eigen::VectorXd ElasticTreePlant::initial_state(const JointArray& angle, const J
 }
 
 TreeVector ElasticTreePlant::spring_torque(ConstVector y) const noexcept {
-  const int n = joints();
+  const Eigen::Index n = joints();
   return stiffness_.cwiseProduct(y.segment(n, n) - y.head(n)) +
          damping_.cwiseProduct(y.segment(3 * n, n) - y.segment(2 * n, n));
 }
@@ -141,7 +141,7 @@ TreeVector ElasticTreePlant::wanted_torque(const TreeVector& spring) const noexc
 }
 
 void ElasticTreePlant::residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept {
-  const int n = joints();
+  const Eigen::Index n = joints();
   const JointArray external = external_torque().at(t);
   const TreeVector spring = spring_torque(y);
   TreeVector moving(n);
@@ -163,7 +163,7 @@ void ElasticTreePlant::residual(double t, ConstVector y, ConstVector y_dot, Vect
 
 void ElasticTreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVector y_dot,
                                 Matrix jacobian) const noexcept {
-  const int n = joints();
+  const Eigen::Index n = joints();
   TreeMatrix by_coordinate;
   TreeMatrix by_speed;
   dynamics_.derivatives(y.data(), y.data() + 2 * n, y_dot.data() + 2 * n, by_coordinate, by_speed);
@@ -175,9 +175,9 @@ void ElasticTreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVe
   const TorqueLoop& loop = parameters_.torque_loop;
   // Of the motor's own equation, in which the wanted torque stands where drives do not lag.
   const double share = lags() ? 1.0 : loop.gain;
-  for (int k = 0; k < n; ++k) {
-    const int link = 2 * n + k;
-    const int motor = 3 * n + k;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Eigen::Index link = 2 * n + k;
+    const Eigen::Index motor = 3 * n + k;
     jacobian(link, k) += stiffness_[k];
     jacobian(link, n + k) -= stiffness_[k];
     jacobian(link, 2 * n + k) += damping_[k];
@@ -187,7 +187,7 @@ void ElasticTreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVe
     jacobian(motor, 2 * n + k) -= share * damping_[k];
     jacobian(motor, 3 * n + k) += share * damping_[k] + c_j * rotor_[k];
     if (lags()) {
-      const int drive = 4 * n + k;
+      const Eigen::Index drive = 4 * n + k;
       jacobian(motor, drive) -= 1.0;
       jacobian(drive, k) += (1.0 - loop.gain) * stiffness_[k];
       jacobian(drive, n + k) -= (1.0 - loop.gain) * stiffness_[k];
@@ -200,7 +200,7 @@ void ElasticTreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVe
 }
 
 void ElasticTreePlant::derivative(double t, ConstVector y, Vector y_dot) const {
-  const int n = joints();
+  const Eigen::Index n = joints();
   const TreeMatrix mass = dynamics_.inertia(y.data());
   const Eigen::LLT<TreeMatrix> cholesky(mass);
   const TreeVector pivots = cholesky.matrixLLT().diagonal().array().square();
@@ -225,7 +225,7 @@ void ElasticTreePlant::derivative(double t, ConstVector y, Vector y_dot) const {
 }
 
 PlantSample ElasticTreePlant::sample(double t, ConstVector y) const {
-  const int n = joints();
+  const Eigen::Index n = joints();
   Eigen::VectorXd y_dot(size());
   derivative(t, y, y_dot);
   PlantSample sample{joint_array(y.head(n)), joint_array(y.segment(2 * n, n)), joint_array(y_dot.segment(2 * n, n)),
@@ -245,7 +245,7 @@ JointArray ElasticTreePlant::mobility(double /*t*/, ConstVector /*y*/) {
 }
 
 double ElasticTreePlant::energy(ConstVector y) const {
-  const int n = joints();
+  const Eigen::Index n = joints();
   const TreeVector deflection = y.segment(n, n) - y.head(n);
   return dynamics_.energy(y.data(), y.data() + 2 * n) + 0.5 * deflection.dot(stiffness_.cwiseProduct(deflection)) +
          0.5 * y.segment(3 * n, n).dot(rotor_.cwiseProduct(y.segment(3 * n, n))) + friction_.energy(y);

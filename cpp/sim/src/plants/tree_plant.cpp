@@ -54,7 +54,7 @@ Eigen::VectorXd TreePlant::absolute_tolerance(double tolerance) const {
 }
 
 Eigen::VectorXd TreePlant::initial_state(const JointArray& angle, const JointArray& speed) const {
-  const int n = joints();
+  const Eigen::Index n = joints();
   Eigen::VectorXd y = Eigen::VectorXd::Zero(size());
   y.head(n) = Eigen::Map<const Eigen::VectorXd>(angle.data(), n);
   y.segment(n, n) = Eigen::Map<const Eigen::VectorXd>(speed.data(), n);
@@ -66,7 +66,7 @@ Eigen::VectorXd TreePlant::initial_state(const JointArray& angle, const JointArr
 }
 
 TreeVector TreePlant::acting_torque(double t, ConstVector y) const noexcept {
-  const int n = joints();
+  const Eigen::Index n = joints();
   if (!lags()) {
     const JointArray torque = joint_torque(t);
     return Eigen::Map<const Eigen::VectorXd>(torque.data(), n);
@@ -76,7 +76,7 @@ TreeVector TreePlant::acting_torque(double t, ConstVector y) const noexcept {
 }
 
 void TreePlant::residual(double t, ConstVector y, ConstVector y_dot, Vector residual) const noexcept {
-  const int n = joints();
+  const Eigen::Index n = joints();
   residual.head(n) = y_dot.head(n) - y.segment(n, n);
   TreeVector moving(n);
   dynamics_.inverse_dynamics(y.data(), y.data() + n, y_dot.data() + n, moving.data());
@@ -91,7 +91,7 @@ void TreePlant::residual(double t, ConstVector y, ConstVector y_dot, Vector resi
 }
 
 void TreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVector y_dot, Matrix jacobian) const noexcept {
-  const int n = joints();
+  const Eigen::Index n = joints();
   TreeMatrix by_coordinate;
   TreeMatrix by_speed;
   dynamics_.derivatives(y.data(), y.data() + n, y_dot.data() + n, by_coordinate, by_speed);
@@ -108,7 +108,7 @@ void TreePlant::jacobian(double /*t*/, double c_j, ConstVector y, ConstVector y_
 }
 
 void TreePlant::derivative(double t, ConstVector y, Vector y_dot) const {
-  const int n = joints();
+  const Eigen::Index n = joints();
   const TreeMatrix mass = dynamics_.inertia(y.data());
   const Eigen::LLT<TreeMatrix> cholesky(mass);
   const TreeVector pivots = cholesky.matrixLLT().diagonal().array().square();
@@ -128,7 +128,7 @@ void TreePlant::derivative(double t, ConstVector y, Vector y_dot) const {
 }
 
 PlantSample TreePlant::sample(double t, ConstVector y) const {
-  const int n = joints();
+  const Eigen::Index n = joints();
   Eigen::VectorXd y_dot(size());
   derivative(t, y, y_dot);
   return {joint_array(y.head(n)), joint_array(y.segment(n, n)), joint_array(y_dot.segment(n, n)),
@@ -136,7 +136,7 @@ PlantSample TreePlant::sample(double t, ConstVector y) const {
 }
 
 JointArray TreePlant::mobility(double /*t*/, ConstVector y) {
-  const int n = joints();
+  const Eigen::Index n = joints();
   const TreeMatrix inverse = dynamics_.inertia(y.data()).llt().solve(TreeMatrix::Identity(n, n));
   return joint_array(inverse.diagonal());
 }

@@ -86,6 +86,7 @@ std::vector<DisturbanceTerm> disturbances(const Field& field, const SystemArtifa
     field.fail(std::to_string(field.size()) + " terms", "at most " + std::to_string(kMaxTerms));
   }
   std::vector<DisturbanceTerm> terms;
+  terms.reserve(field.size());
   for (std::size_t i = 0; i < field.size(); ++i) {
     terms.push_back(disturbance(field.at(i), artifact));
   }

@@ -8,7 +8,7 @@
 namespace quasilpv {
 namespace {
 
-const SystemScenario& checked(const SystemArtifact& artifact, const SystemScenario& scenario) {
+SystemScenario checked(const SystemArtifact& artifact, SystemScenario scenario) {
   const auto require_size = [](const char* field, std::size_t got, std::size_t expected) {
     if (got != expected) {
       throw InputError("experiment", field, std::to_string(got) + " values", std::to_string(expected));

@@ -120,8 +120,8 @@ class ReferenceGuard {
   void reset(const JointVector<N>& angle) noexcept { held_ = angle; }
 
   ReferenceVectors<N> accept(const Reference& reference, StepReport& report) noexcept {
-    const ReferenceVectors<N> offered{from_array<N>(reference.angle), from_array<N>(reference.speed),
-                                      from_array<N>(reference.acceleration)};
+    ReferenceVectors<N> offered{from_array<N>(reference.angle), from_array<N>(reference.speed),
+                                from_array<N>(reference.acceleration)};
     if (!offered.is_finite()) {
       report.flags |= kReferenceInvalid;
       return {held_, JointVector<N>::Zero(), JointVector<N>::Zero()};
