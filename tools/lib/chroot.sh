@@ -12,6 +12,8 @@ fi
 system=$2
 shift 2
 
+# A mount point, for its / to be one: what runs there may make systems and namespaces of its own (tools/wheels).
+mount --bind "$system" "$system"
 mount -t proc proc "$system/proc"
 mount -t sysfs -o ro sysfs "$system/sys"
 mount -t tmpfs -o mode=755 tmpfs "$system/dev"
