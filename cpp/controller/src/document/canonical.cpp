@@ -28,11 +28,10 @@ void check_depth(int depth) {
   }
 }
 
-const std::string& checked_key(const std::string& key) {
+void check_key(const std::string& key) {
   if (!is_ascii(key)) {
     refuse("member name", "a name with characters outside ASCII", "ASCII");
   }
-  return key;
 }
 
 double checked_number(const Json& value) {
@@ -56,8 +55,9 @@ void write_json(const Json& value, int depth, std::string& out) {
     check_depth(depth);
     char separator = '{';
     for (const auto& [key, member] : value.items()) {  // nlohmann keeps members sorted by byte
+      check_key(key);
       out += separator;
-      out += quoted(checked_key(key));
+      out += quoted(key);
       out += ':';
       write_json(member, depth + 1, out);
       separator = ',';
@@ -164,7 +164,8 @@ void write_cbor(const Json& value, int depth, std::string& out) {
     check_depth(depth);
     std::vector<const std::string*> keys;
     for (const auto& item : value.get_ref<const Json::object_t&>()) {
-      keys.push_back(&checked_key(item.first));
+      check_key(item.first);
+      keys.push_back(&item.first);
     }
     // The bytewise order of encoded keys is: shorter first, then by byte, because the head holds the length.
     std::sort(keys.begin(), keys.end(), [](const std::string* a, const std::string* b) {

@@ -136,6 +136,7 @@ void add_robot_row(CsvWriter& csv, const TelemetrySample& sample, int joints) {
 
 std::vector<std::string> names_of(const std::vector<SystemSignal>& signals, const std::string& what) {
   std::vector<std::string> names;
+  names.reserve(signals.size());
   for (const SystemSignal& signal : signals) {
     names.push_back(what + "." + signal.name);
   }

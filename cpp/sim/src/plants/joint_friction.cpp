@@ -110,7 +110,8 @@ void PlantFriction::bristle_rates(Plant::ConstVector y, Plant::Vector rates) con
   }
 }
 
-void PlantFriction::add_jacobian(Plant::ConstVector y, double c_j, Eigen::Index force, Plant::Matrix jacobian) const noexcept {
+void PlantFriction::add_jacobian(Plant::ConstVector y, double c_j, Eigen::Index force,
+                                 Plant::Matrix jacobian) const noexcept {
   for (int k = 0; k < joints(); ++k) {
     const JointFriction::Slopes slopes = own(k).slopes(y[speed_ + k], bristle_of(y, k));
     jacobian(force + k, speed_ + k) += slopes.torque_by_speed;
